@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One readable file per claim: the claim, its source, the published number, and the run that tests it."""
+"""The experiments that test published claims: each module of `claims` states claims, sources and published numbers, and has the run."""

@@ -32,13 +32,17 @@ _PARTS: dict[str, tuple[str, ...]] = {
 
 
 def chapter_of(claim: Claim) -> int:
-    """Return the first chapter of the thesis in the claim's source."""
+    """Return the number of the first thesis chapter that the claim's source names; 7 if the source names only the paper."""
     found = re.search(r"thesis (\d+)", claim.source)
     return int(found[1]) if found else _PAPER
 
 
 def section(table: Sequence[tuple[str, Claim]], untested: Callable[[str, str], str]) -> str:
-    """Return the chapters as Markdown; `untested`: of an experiment's claim, by its text, what no run varies."""
+    """Return the published claims as Markdown: a section for each chapter of the thesis, with the claims grouped by verdict.
+
+    `table`: name of the experiment and claim, for each claim; our own aims are left out.  `untested`: function of an experiment's name and
+    a claim's text that returns what the publications leave open and no run varied ("" if there is nothing).
+    """
     published = [(name, claim) for name, claim in table if not claim.is_aim]
     lines = list[str]()
     for number, title in CHAPTERS.items():
@@ -76,6 +80,6 @@ def _parts(claim: Claim, untested: str) -> Iterator[str]:
 
 
 def with_section(page: str, text: str) -> str:
-    """Return a page with the text between its markers."""
+    """Return the Markdown page `page` with `text` in place of everything between its two comments BEGIN and END."""
     before, _, rest = page.partition(BEGIN)
     return f"{before}{BEGIN}\n\n{text}\n\n{END}{rest.partition(END)[2]}"

@@ -81,20 +81,21 @@ intervals include noise, starts and random choices, but not the draw of the grap
 
 
 def stated() -> Rows:
-    """Return the claims of all experiments without measured numbers; those of chapter 7 first, in its order."""
+    """Return the name of the experiment and the claim, without measured numbers, for all claims; those of chapter 7 come first."""
     names = dict.fromkeys((*CHAPTER7, *BEYOND, *EXPERIMENTS))
     return [(name, claim) for name in names for claim in load_experiment(name).claims]
 
 
 def recorded() -> Recorded:
-    """Return the record from which the page was last written."""
+    """Return the record in claims.json, from which the page was last written: entries by the experiment's name; empty without the file."""
     return {current_name(name): entry for name, entry in read(RECORD).items()} if RECORD.exists() else {}
 
 
 def rows(record: Mapping[str, Mapping[str, Any]], confirms: bool = False) -> Rows:
-    """Return every claim, with its measured numbers if there are any, and open if it is not distinguished from chance among all rows.
+    """Return the name of the experiment and the claim, for all claims, with the recorded numbers and verdicts as far as there are any.
 
-    `confirms`: those of the runs with new seeds.
+    `record`: the table's entries, by the experiment's name.  `confirms`: take the entries of the runs with new seeds instead of those of
+    the first runs.  A claim becomes open if its p value is too large among those of all claims, as decided by `largest_rate`.
     """
     entries = {name: entry.get(CONFIRMED, {}) if confirms else entry for name, entry in record.items()}
     measured = {(name, c["source"], c["text"]): Claim(**c) for name, entry in entries.items() for c in entry.get("claims", ())}
@@ -105,14 +106,20 @@ def rows(record: Mapping[str, Mapping[str, Any]], confirms: bool = False) -> Row
 
 
 def largest_rate(p: Sequence[float]) -> float:
-    """Return the largest p value of a decision if at most FALSE_DISCOVERIES of the decisions may be wrong (Benjamini, Hochberg 1995)."""
+    """Return the largest p value with which a decision still counts, by the procedure of Benjamini and Hochberg (1995); 0 if none counts.
+
+    `p`: the p values of all decisions.  Of the decisions that count, the share FALSE_DISCOVERIES (0.05) at most is expected to be wrong.
+    """
     ordered = sorted(p)
     allowed = [FALSE_DISCOVERIES * rank / len(ordered) for rank in range(1, len(ordered) + 1)]
     return max((most for value, most in zip(ordered, allowed, strict=True) if value <= most), default=0.0)
 
 
 class Finished(NamedTuple):
-    """A finished run: its entry in the table, its folder, and the file with its versions."""
+    """A finished run.
+
+    `entry`: its entry in the table of claims.  `run`: its folder.  `versions`: path of the file with the versions of the software.
+    """
 
     entry: Entry
     run: Path
@@ -120,9 +127,10 @@ class Finished(NamedTuple):
 
 
 def runs_in(folders: Sequence[Path]) -> dict[str, Finished]:
-    """Return the finished run of each experiment, the parts of a chapter's run included; among several, the one that `better` chooses.
+    """Return the finished run of each experiment in these folders, by the experiment's name; runs whose results have no claims are ignored.
 
-    Raises InvalidValue for a folder without results.
+    A folder is that of an experiment's run, or that of a chapter's run, which has a folder for each experiment.  Of several runs of one
+    experiment, the one with the most seeds is returned, of equal ones the last.  Raises InvalidValue for a folder without results.
     """
     found: dict[str, Finished] = {}
     for name, run, versions in _finished_in(folders):
@@ -133,7 +141,7 @@ def runs_in(folders: Sequence[Path]) -> dict[str, Finished]:
 
 
 def entries_of(found: Mapping[str, Finished]) -> Recorded:
-    """Return the entries of finished runs."""
+    """Return the table entries of finished runs, by the experiment's name."""
     return {name: one.entry for name, one in found.items()}
 
 
@@ -169,23 +177,26 @@ def _counts_more(one: Entry, before: Entry) -> bool:
 
 
 def better(before: Recorded, after: Recorded) -> Recorded:
-    """Merge two records: of each experiment the one with more seeds, and `after` if both have equally many."""
+    """Return both records merged: each experiment has the entry with more seeds, and that of `after` if both have equally many."""
     return replaced(before, {name: one for name, one in after.items() if name not in before or _counts_more(one, before[name])})
 
 
 def replaced(before: Recorded, after: Recorded) -> Recorded:
-    """Return a record with the entries of `after` in place of those before; their results with new seeds are kept."""
+    """Return the record `before` with the entries of `after` in place of its own; its entries of runs with new seeds are kept."""
     kept = {name: {CONFIRMED: entry[CONFIRMED]} for name, entry in before.items() if CONFIRMED in entry}
     return before | {name: kept.get(name, {}) | entry for name, entry in after.items()}
 
 
 def with_confirmed(record: Recorded, found: Recorded) -> Recorded:
-    """Return the record with the entries of runs with new seeds beside those of the first runs."""
+    """Return the record with the entries `found` of runs with new seeds: each is stored in the experiment's entry, under "confirmed"."""
     return record | {name: {**record.get(name, {"seeds": None, "commit": None, "claims": []}), CONFIRMED: found[name]} for name in found}
 
 
 def finished_runs(runs: Path, confirms: bool = False) -> list[Path]:
-    """Return the folders of runs with results, without --quick runs, the oldest first; `confirms`: those with new seeds."""
+    """Return the folders of the finished runs in the folder `runs`, the oldest first; runs with --quick are left out.
+
+    `confirms`: True: only the runs with new seeds (from CONFIRMING_SEED, 1000, on); False: only the other runs.
+    """
     folders = sorted({path.parent for path in runs.glob(f"*/{CONFIG}")}, key=lambda folder: folder.name)
     known = [folder for folder in folders if current_name(read(folder / CONFIG).get("experiment", "")) in EXPERIMENTS and _counts(folder)]
     return [folder for folder in known if _confirms(folder) == confirms]
@@ -201,7 +212,10 @@ def _confirms(run: Path) -> bool:
 
 
 def require_seeds(folders: Sequence[Path], confirms: bool) -> None:
-    """Raise InvalidValue for a run that has new seeds, or with `confirms` for one that has not."""
+    """Raise InvalidValue if a run has new seeds (from CONFIRMING_SEED, 1000, on); with `confirms`, if a run has other seeds.
+
+    `folders`: the folders of the runs.
+    """
     for folder in folders:
         if _confirms(folder) != confirms:
             said = f"seeds below {CONFIRMING_SEED}, which confirm nothing: leave --confirm out" if confirms else "new seeds: add --confirm"
@@ -209,10 +223,11 @@ def require_seeds(folders: Sequence[Path], confirms: bool) -> None:
 
 
 def keep_records(found: Mapping[str, Finished], record: Recorded, confirms: bool = False) -> list[str]:
-    """Write the raw records of the runs whose numbers are in the record; `confirms`: of those with new seeds.
+    """Write the raw records of runs into experiments/records, if the numbers of the run are those of the table.
 
-    Returns a message for each run that is too large; the records of the others are written.  Raises InvalidValue for new seeds if the rules
-    are not the frozen ones, or if other seeds have confirmed them.
+    `found`: the runs by the experiment's name.  `record`: the table's entries.  `confirms`: whether the runs have new seeds.  Returns a
+    message for each run whose raw record is too large; the raw records of the others are written.  Raises InvalidValue for a run with new
+    seeds if the rules are not the frozen ones, or if an earlier run with new seeds is recorded already.
     """
     failed = []
     for name, one in found.items():
@@ -230,15 +245,19 @@ def keep_records(found: Mapping[str, Finished], record: Recorded, confirms: bool
 
 
 def recomputed(name: str, confirms: bool = False) -> Entry:
-    """Return the entry of an experiment, computed from its raw record; raises InvalidValue if there is none."""
+    """Return the table entry of an experiment, computed from its raw record; raises InvalidValue if there is no raw record.
+
+    `confirms`: use the raw record of the run with new seeds.
+    """
     with opened_record(name, confirms) as run:
         return _entry(name, run, run / VERSIONS)
 
 
 def differences(name: str, entry: Mapping[str, Any], confirms: bool = False) -> list[str]:
-    """Compare the raw record of an experiment with its entry in the table; returns a line for each difference.
+    """Compare the table entry of an experiment with its raw record; returns a line of text for each difference.
 
-    An entry without a record must leave its claims open.
+    Without a raw record, each claim of the entry that is not open is a difference.  `confirms`: use the raw record of the run with new
+    seeds.
     """
     label = f"{name}, new seeds" if confirms else name
     if not record_path(name, confirms).exists():
@@ -258,7 +277,10 @@ def differences(name: str, entry: Mapping[str, Any], confirms: bool = False) -> 
 
 
 def all_differences(record: Recorded) -> list[str]:
-    """Compare all raw records with the table; returns a line for each difference."""
+    """Compare the entries of the table with all raw records; returns a line of text for each difference.
+
+    A raw record without an entry in the table is a difference, too.
+    """
     lines = [line for name, entry in record.items() for line in differences(name, entry)]
     lines += [line for name, entry in record.items() if CONFIRMED in entry for line in differences(name, entry[CONFIRMED], True)]
     known = {record_path(name) for name in record} | {record_path(name, True) for name, entry in record.items() if CONFIRMED in entry}
@@ -266,7 +288,10 @@ def all_differences(record: Recorded) -> list[str]:
 
 
 def write_page(record: Recorded) -> None:
-    """Write the record, the page, and the chapters in docs/results.md; the claims of an experiment without a raw record are open."""
+    """Write the record to claims.json, the page to experiments/README.md, and the chapters into docs/results.md.
+
+    The claims of an experiment without a raw record become open.  Raises InvalidValue outside a clone of the repository.
+    """
     if not chapters.PAGE.exists():
         raise InvalidValue(f"there is no {chapters.PAGE}: the table is written in a clone of the repository.")
     kept = {name: _recorded_only(name, record[name]) for name in sorted(record) if name in EXPERIMENTS}
@@ -282,7 +307,10 @@ def _recorded_only(name: str, entry: Entry) -> Entry:
 
 
 def page(record: Recorded) -> str:
-    """Return the page as Markdown: the published claims, then our own aims."""
+    """Return the text of experiments/README.md as Markdown: the claims of the thesis and the paper, then our own aims.
+
+    `record`: the table's entries, by the experiment's name.
+    """
     table, confirming = rows(record), dict(_keyed(rows(record, confirms=True)))
     lines = [_HEAD]
     for title, is_aim in (("Claims of the thesis and the paper", False), ("Aims of our own", True)):
@@ -302,13 +330,13 @@ def page(record: Recorded) -> str:
 
 
 def chapters_text(record: Recorded) -> str:
-    """Return the published claims by chapter of the thesis, as Markdown."""
+    """Return the published claims by chapter of the thesis as Markdown, with the numbers of the record."""
     untested = {(name, claim.text): claim.untested for name, claim in stated()}
     return chapters.section(rows(record), lambda name, text: untested[name, text])
 
 
 def counts_text(table: Rows) -> str:
-    """Return how many claims have each verdict, as text."""
+    """Return the number of claims with each verdict as text, as "12 confirmed, 3 open"."""
     counts = Counter(claim.verdict for _, claim in table)
     return ", ".join(f"{counts[verdict]} {verdict}" for verdict in VERDICTS if counts[verdict])
 
@@ -318,7 +346,7 @@ def _keyed(table: Rows) -> Iterator[tuple[tuple[str, str], Claim]]:
 
 
 def claims_text(table: Sequence[tuple[str, Claim]], width: int) -> str:
-    """Return the claims as text for a terminal: each with its verdict, and the numbers below."""
+    """Return the claims as text for a terminal of `width` columns: verdict, claim and source, published number, our number, settings."""
     lines = []
     for _, claim in table:
         parts = [f"{claim.text} ({claim.source})", f"published: {claim.published}", f"ours: {claim.ours or 'not measured'}"]

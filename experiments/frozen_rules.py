@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The frozen rules: the claims of each experiment and the constants of its module, among them the thresholds, in `frozen.json`.
 
-They were chosen with the results of the first seeds in view.  After they are frozen, an experiment can be run once with new seeds, and is
-judged by the same rules.  From then on its rules cannot be changed by freezing them again.
+The rules were chosen when the results of the first seeds were known.  After the rules are frozen, an experiment can be run once with new
+seeds, and is judged by the frozen rules.  From then on its rules cannot be changed by freezing them again.
 """
 
 from __future__ import annotations
@@ -29,7 +29,11 @@ Rules = dict[str, dict[str, Any]]  # "claims": published values by text; "consta
 
 
 def rules_of(name: str) -> Rules:
-    """Return the claims of an experiment, and the plain constants of its module and of modules that it imports whole, as JSON has them."""
+    """Return the rules of an experiment: "claims": published numbers by the claim's text; "constants": values by name, as JSON has them.
+
+    The constants are the numbers, texts and collections of them in its module, and in the modules of `experiments.claims` that this module
+    imports whole.
+    """
     module = importlib.import_module(EXPERIMENTS[name])
     imported = [one for one in vars(module).values() if isinstance(one, ModuleType) and one.__name__.startswith("experiments.claims.")]
     constants = {key: value for one in (*imported, module) for key, value in _constants(one).items()}
@@ -37,15 +41,15 @@ def rules_of(name: str) -> Rules:
 
 
 def shared_rules() -> Rules:
-    """Return the constants that the rules of all experiments use."""
+    """Return the constants that the rules of all experiments use, by name, under the key "constants"."""
     return {"constants": _plain({"MIN_SEEDS": MIN_SEEDS} | _constants(statistics) | _constants(rules))}
 
 
 def freeze(names: Sequence[str]) -> list[str]:
-    """Write the rules of those of these experiments that have claims into `frozen.json`; the others stay as they are frozen.
+    """Write the rules of the named experiments, and the constants that all experiments share, into `frozen.json`.
 
-    Returns the names of the experiments that have claims.  Raises InvalidValue if an experiment that has been run with new seeds would get
-    other rules.
+    Names of experiments without claims are ignored; experiments that are not named keep their frozen rules.  Returns the names of the
+    experiments whose rules were written.  Raises InvalidValue if the rules of an experiment that has been run with new seeds would change.
     """
     before = frozen()
     written = {name: rules_of(name) for name in names if load_experiment(name).claims}
@@ -60,12 +64,15 @@ def freeze(names: Sequence[str]) -> list[str]:
 
 
 def frozen() -> dict[str, Rules]:
-    """Return the frozen rules by experiment; empty if none are frozen; raises InvalidValue if the file is damaged."""
+    """Return the frozen rules by the experiment's name, and under "all" the constants that all experiments share.
+
+    The dict is empty if no rules are frozen.  Raises InvalidValue if the file is damaged.
+    """
     return read(FROZEN) if FROZEN.exists() else {}
 
 
 def require_frozen(name: str) -> None:
-    """Raise InvalidValue unless the rules of an experiment are the frozen ones."""
+    """Raise InvalidValue if the rules of an experiment, or the constants that all experiments share, differ from the frozen ones."""
     kept = frozen()
     if changed := [*_changed(kept, _ALL, shared_rules()), *_changed(kept, name, rules_of(name))]:
         raise InvalidValue(

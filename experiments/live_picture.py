@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Take the picture of the running system: start a scenario, open its page in headless Chromium, take a screenshot.
 
-`mobee learn --robot icub --transitions 2000 --store icub.sqlite` and `python -m experiments.live_picture --scenario icub.toml
---warm-up 25` write docs/figures/live.png, of agents that have learned for 80 minutes offline.
+`mobee learn --robot icub --transitions 2000 --store icub.sqlite`, then `python -m experiments.live_picture --scenario icub.toml --warm-up
+25`, write docs/figures/live.png.  The picture shows agents that have learned for 80 minutes offline.
 """
 
 from __future__ import annotations
@@ -32,7 +32,10 @@ IS_TOLD = "Boolean(document.querySelector('.card .now'))"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Take the screenshots; returns 0, or 1 with a message if Chromium is not installed."""
+    """Take the screenshots and print their paths; returns 0, or 1 with a message if Chromium is not installed.
+
+    `argv`: arguments of the command line; None: those of the process.
+    """
     options = _options(argv)
     chromium = find_chromium()
     if chromium is None:
@@ -64,7 +67,17 @@ def find_chromium() -> str | None:
 
 
 def take(url: str, chromium: str, folder: Path, size: Sequence[int], shots: int, gap: float, warm_up: float) -> Iterator[Path]:
-    """Yield screenshots of the page at `url`, `gap` seconds apart, `warm_up` seconds after it shows text about the agents."""
+    """Take screenshots of the page with headless Chromium, and yield the path of each PNG file.
+
+    Args:
+        url: address of the page.
+        chromium: path of the program.
+        folder: where the files are written.
+        size: width and height of the page, pixels.
+        shots: number of screenshots.
+        gap: time between two screenshots, s.
+        warm_up: time from the first text about an agent on the page to the first screenshot, s.
+    """
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
@@ -126,7 +139,7 @@ def _address(launcher: subprocess.Popen[str]) -> str:
 
 
 def free_ports(count: int) -> list[int]:
-    """Return free ports of the loopback interface."""
+    """Return `count` TCP ports of the loopback interface that are free now."""
     probes = [socket.socket() for _ in range(count)]
     for probe in probes:
         probe.bind(("127.0.0.1", 0))

@@ -123,7 +123,7 @@ def all_names(name: str) -> tuple[str, ...]:
 
 
 def load_experiment(name: str) -> Experiment:
-    """Return the experiment of a current or former name; raises UnknownName with the nearest name."""
+    """Return the experiment with this current or former name; for any other name raises UnknownName, which suggests the nearest name."""
     name = current_name(name)
     if name not in EXPERIMENTS:
         raise UnknownName("experiment", name, EXPERIMENTS)

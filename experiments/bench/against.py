@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compares two checkouts in one run: the processor time of the same work in each.
+"""Compares the processor time of the same work in two checkouts of this repository.
 
-In a round of a case each checkout runs in a fresh process; both prepare the case and do its work once without timing, and then by
-turns (old, new, new, old, ...).  Processor time is counted, so other programs on the machine matter little.  The ratio of a round is
-that of the sums; the verdict rests on the median of the rounds.
+A case is measured in rounds.  In each round every checkout runs in a fresh process.  Both prepare the case and do its work once without
+timing; then they do it by turns (old, new, new, old, ...).  Only processor time is counted, so other programs on the machine matter little.
+The ratio of a round is the sum of the old times over the sum of the new times.  The verdict rests on the median ratio of the rounds.
 """
 
 from __future__ import annotations
@@ -40,7 +40,11 @@ Pair = dict[str, dict[str, Any]]  # of "old" and "new": seconds of the work, and
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """The checkouts, each a folder or a commit of this repository, the Python of the old one, the cases, and the rounds of each."""
+    """What `mobee bench against` compares.
+
+    `old`, `new`: the checkouts, each the path of a folder or a commit of this repository.  `old_python`: the Python interpreter that runs
+    the old one.  `cases`: names of `against_cases.CASES`.  `rounds`: number of rounds of each case.
+    """
 
     old: str
     new: str = str(REPOSITORY)
@@ -50,23 +54,23 @@ class Settings:
 
 
 class AgainstFailed(MobeeError):
-    """A checkout that does not exist, or a case that does not run in it; the message has the last line of its output."""
+    """Raised if a checkout does not exist, or if a case does not run in it.  The message contains the last line of its output."""
 
 
 @dataclass(frozen=True, slots=True)
 class Checkout:
-    """A folder with the sources, and the Python that runs them."""
+    """A folder with the sources of MoBeE, and the Python interpreter that runs them."""
 
     folder: Path
     python: str = sys.executable
 
     def start(self, case: str) -> Worker:
-        """Start a process that prepares the case."""
+        """Start a process of this checkout that prepares the case (a name in `against_cases.CASES`), and return it."""
         return Worker(self, case)
 
 
 class Worker:
-    """A process of one checkout that does the work of a case.  A context manager: the process ends with it."""
+    """A process of one checkout that does the work of a case.  It is a context manager: the process ends when the context is left."""
 
     def __init__(self, checkout: Checkout, case: str) -> None:
         self._checkout, self._case = checkout, case
@@ -91,13 +95,19 @@ class Worker:
         self._log.close()
 
     def await_ready(self) -> None:
-        """Wait until the case is prepared; raises AgainstFailed."""
+        """Wait until the process has prepared the case.
+
+        Raises AgainstFailed if it cannot, or if it imports `mobee` from another folder.
+        """
         library = Path(self._answer()["library"])
         if not library.is_relative_to(self._checkout.folder):
             raise AgainstFailed(f"{self._case}: the library was taken from {library}, not from {self._checkout.folder}")
 
     def work(self) -> dict[str, Any]:
-        """Do the work once; returns the seconds and counts that the process reports.  Raises AgainstFailed."""
+        """Do the work once and return the report of the process.
+
+        Keys: "seconds", the processor time [s], and "work", counts of the work done.  Raises AgainstFailed if the process has ended.
+        """
         assert self._process.stdin is not None
         with contextlib.suppress(BrokenPipeError):  # `_answer` raises with the reason
             print("again", file=self._process.stdin, flush=True)
@@ -117,7 +127,11 @@ class Worker:
 
 @contextlib.contextmanager
 def checkout(folder_or_commit: str, python: str = sys.executable) -> Iterator[Checkout]:
-    """Yield a folder as a checkout, or a commit of this repository in a temporary folder; raises AgainstFailed."""
+    """Yield the checkout of a folder, or of a commit of this repository.
+
+    A commit is checked out into a temporary folder, which is removed at the end.  Raises AgainstFailed if git is missing or the commit does
+    not exist.
+    """
     if folder_or_commit and Path(folder_or_commit).is_dir():
         yield Checkout(Path(folder_or_commit).resolve(), python)
         return
@@ -131,7 +145,7 @@ def checkout(folder_or_commit: str, python: str = sys.executable) -> Iterator[Ch
 
 
 def build_core(checkout: Checkout) -> None:
-    """Build the native core of a checkout of a commit, if that has one; raises AgainstFailed."""
+    """Build the native core of a checkout by its script core/build.py, if it has this script.  Raises AgainstFailed if the build fails."""
     script = checkout.folder / "core" / "build.py"
     if script.exists():
         done = subprocess.run([checkout.python, str(script)], cwd=checkout.folder, capture_output=True, text=True, check=False)
@@ -149,7 +163,10 @@ def _git(*words: str) -> None:
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """Measure, and return all numbers and the verdict; raises AgainstFailed."""
+    """Run this benchmark and return the result of `measure_checkouts`; raises AgainstFailed.
+
+    If a checkout is given as a commit, its native core is built first.
+    """
     with checkout(settings.old, settings.old_python) as old, checkout(settings.new) as new:
         for given, one in ((settings.old, old), (settings.new, new)):
             if not Path(given).is_dir():
@@ -158,7 +175,10 @@ def measure(settings: Settings) -> dict[str, Any]:
 
 
 def measure_checkouts(old: Checkout, new: Checkout, cases: Sequence[str], rounds: int) -> dict[str, Any]:
-    """Measure the cases in two checkouts; raises AgainstFailed."""
+    """Measure the cases in two checkouts by turns and return the result; raises AgainstFailed.
+
+    Keys: "rounds"; "cases", the result of `compared` by case; "requirements" and "passed", as of `verdicts.verdict`.
+    """
     pairs: dict[str, list[Pair]] = {case: [] for case in cases}
     with Progress() as progress:
         for done in range(len(cases) * rounds):
@@ -186,7 +206,11 @@ def _round(old: Checkout, new: Checkout, case: str, turns: int) -> Pair:
 
 
 def compared(rounds: Sequence[Pair]) -> dict[str, Any]:
-    """Return medians of the times and ratios of one case over its rounds, and the spread of the ratios."""
+    """Return the statistics of one case over its rounds.
+
+    Keys: "old_s" and "new_s", median times [s]; "ratio", the median of old over new; its "quartiles" and "range", each two numbers; "work",
+    counts of the work of each checkout in the last round; "same_work", whether these counts are equal.
+    """
     old, new = (np.array([one[which]["seconds"] for one in rounds]) for which in ("old", "new"))
     ratios = old / new
     lower, middle, upper = np.percentile(ratios, [25, 50, 75])
@@ -203,7 +227,7 @@ def compared(rounds: Sequence[Pair]) -> dict[str, Any]:
 
 
 def report(result: Mapping[str, Any]) -> str:
-    """Format the measurements."""
+    """Return the result of `measure` as text: a table with one line for each case, then the requirements."""
     lines = [f"Processor time of the same work, medians of {result['rounds']} rounds; ratio: old over new"]
     lines.append(f"{'':<20}{'old, s':>9}{'new, s':>9}{'ratio':>8}{'quartiles':>15}{'range':>15}")
     for case, one in result["cases"].items():

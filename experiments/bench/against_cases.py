@@ -3,9 +3,9 @@
 
     PYTHONPATH=CHECKOUT python -P against_cases.py CASE
 
-Checkouts back to commit 10a73fe can be measured: modules that have moved since then are imported by `_first`.  The process prepares
-the case, does its work once to warm up, and again for every line that it reads; each time it prints as JSON the processor time, and
-counts that show whether two checkouts did the same work.
+Checkouts back to commit 10a73fe can be measured: modules that have moved since then are imported by `_first`.  The process prepares the
+case and does its work once to warm up.  Then it does the work again for every line of its standard input.  Each time it prints a line of
+JSON with the processor time and counts of the work, which show whether two checkouts did the same work.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ LOCKSTEP_TICKS = (100, 3100)  # of two runs: their difference is without the sta
 
 
 def main() -> None:
-    """Prepare a case, and do its work once for every line of standard input."""
+    """Prepare the case that the command line names, then do its work once for every line of standard input and print times and counts."""
     import mobee
 
     name = sys.argv[1]

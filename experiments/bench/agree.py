@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compares the live system in lockstep with the offline plant: both must compute the same motions.
 
-Claim: on the motor model, encoder noise included, every action of three curious agents ends at the same tick, in the same state and
-within 1e-9 rad of the same posture in both.  Run time: about 30 s for 100 actions.
+Claim: on the motor model, encoder noise included, every action of three curious agents ends at the same tick, in the same state and within
+1e-9 rad of the same posture in both.  Run time: about 30 s for 100 actions.
 
 One difference is by design: robot_sim has a safety gate, which brakes a motor that could not stop before its limit; the plant has hard
-stops only.  No action of these agents gets there.
+stops only.  No action of these agents moves a motor so near to a limit that the gate brakes.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ Observed = Mapping[str, Sequence[Transition]]  # of each part
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """About how many actions are compared, and the seed of agents and noise."""
+    """What is run.  `actions`: about how many actions of all agents are compared.  `seed`: of the agents and of the encoder noise."""
 
     actions: int = 100
     seed: int = 0
@@ -43,7 +43,12 @@ class Settings:
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """Comparison of two runs of equal agents, over the actions that occur in both runs."""
+    """Comparison of a live run and an offline run of equal agents, over the actions that occur in both runs.
+
+    `actions`: number of compared actions.  `worst`: largest difference of a motor's position at the end of an action [rad].  `same`:
+    whether states, ticks, settling and touched objects are equal.  `first_difference`: the first action in which these differ, as text; ""
+    without one.
+    """
 
     actions: int
     worst: float  # rad, between the postures in which they ended
@@ -52,19 +57,26 @@ class Agreement:
 
     @property
     def passed(self) -> bool:
-        """Whether both compute the same motions."""
+        """Whether both runs made the same motions, with postures equal within MAX_DIFFERENCE (1e-9 rad)."""
         return self.actions > 0 and self.same and self.worst <= MAX_DIFFERENCE
 
 
 def lockstep(ticks: int, seed: int, folder: Path) -> tuple[dict[str, list[Transition]], dict[str, Any]]:
-    """Run live agents for `ticks` ticks; return the transitions of each part and the summary.  The run's files stay in `folder`."""
+    """Run three live agents in lockstep for `ticks` ticks.
+
+    Returns the transitions of each part, by the name of the part, and the summary of the run.  The files of the run are in a new folder in
+    `folder`.
+    """
     summary = summary_of("lockstep", [f"shared.seed={seed}", PATIENCE], ticks=ticks, runs=folder)
     file = Path(summary["run"]) / "transitions.sqlite"
     return {part: TransitionStore(file, part).load() for part in AGENTS}, summary
 
 
 def offline(actions: int, seed: int, folder: Path) -> dict[str, list[Transition]]:
-    """Run the same agents on the offline plant; returns their transitions, by part."""
+    """Run the same three agents on the offline plant for `actions` actions in all.
+
+    Returns the transitions of each part, by the name of the part.  The file of the transitions is in `folder`.
+    """
     robot, world = load_robot("icub"), load_world("table")
     world.remove("ball")  # live, it is not seen without cameras
     plant = OfflinePlant(Model(robot, world), seed=seed, gains=Gains.named("published_2014"), dt=TICK)
@@ -79,7 +91,10 @@ def offline(actions: int, seed: int, folder: Path) -> dict[str, list[Transition]
 
 
 def compare(live: Observed, plant: Observed) -> Agreement:
-    """Compare the actions that both made, in order."""
+    """Compare the actions of a live and an offline run, in order; of each part, only as many as occur in both runs.
+
+    `live`, `plant`: the transitions of both runs, by the name of the part.
+    """
     worst, actions, first = 0.0, 0, ""
     for part in live:
         for ours, theirs in zip(live[part], plant[part], strict=False):
@@ -91,7 +106,10 @@ def compare(live: Observed, plant: Observed) -> Agreement:
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """Run both, and return how they compare, and the live run's summary under "lockstep"; raises LaunchFailed."""
+    """Run the agents live and offline, and return the comparison; raises LaunchFailed if the live system does not run.
+
+    Keys: the fields of `Agreement`, "passed", and "lockstep", the part of the live run's summary about lockstep.
+    """
     with tempfile.TemporaryDirectory() as folder:
         live, summary = lockstep(round(settings.actions * ACTION_SECONDS / TICK), settings.seed, Path(folder))
         count = sum(map(len, live.values())) + 2 * len(AGENTS)  # the actions that were under way at the end were begun in both
@@ -100,7 +118,7 @@ def measure(settings: Settings) -> dict[str, Any]:
 
 
 def report(result: Mapping[str, Any]) -> str:
-    """Format the comparison."""
+    """Return the result of `measure` as two lines of text."""
     first = result["first_difference"] or "in the same ticks and states, settled or not, touching the same objects"
     return f"{result['actions']} actions: they end within {result['worst']:.1e} rad of each other in lockstep and offline\n{first}"
 

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compares the contacts of the model with those of its peers: the same pairs, and depths that are right and minimal.
 
-Two programs may differ on whether a pair touches that overlaps by less than MIN_OVERLAP.  A depth is *right* if it is how far the first
-volume must move along the normal until a plane separates the two; it is *minimal* if no peer gives a direction in which a shorter motion
-separates the volumes. `separation` computes both, so a peer whose own depths are not minimal (MuJoCo's contact points, the iterative
-searches of coal and fcl where cylinders meet) can be used all the same.
+If two volumes overlap by less than MIN_OVERLAP, two programs may differ on whether they touch.  A depth is *right* if it is the distance
+that the first volume must move along the normal until a plane separates the two.  It is *minimal* if no peer gives a direction in which a
+shorter motion separates the volumes.  `separation` computes this distance for any direction.  Therefore a peer can be used even if its own
+depths are not minimal, as with MuJoCo's contact points and with the iterative searches of coal and fcl for cylinders.
 """
 
 from __future__ import annotations
@@ -40,7 +40,13 @@ Place = tuple[Array, Array]
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """Comparison of the model with one peer, over all poses."""
+    """Comparison of the model's contacts with those of one peer, over all poses of a scene.
+
+    `contacts`: number of the model's contacts.  `other_pairs`: number of contacts that only one of the two programs finds; `deepest_other`:
+    depth of the deepest one [m].  `depth_difference`: largest difference of depths [m], by kinds of volumes ("box-capsule").
+    `same_depths`: share of the contacts whose depths differ by at most DEPTH_TOLERANCE (1e-9 m).  `beaten`: largest excess [m] of our depth
+    over the separation along the peer's normal.
+    """
 
     peer: str
     scene: str
@@ -56,7 +62,11 @@ class Agreement:
 
 
 class ModelContacts:
-    """The model's contacts in a scene, pose by pose, and the poses of all volumes."""
+    """The model's contacts in all poses of a scene, and the poses of all volumes.
+
+    `contacts`: for each pose, a dict from pairs of indices in `volumes` to depth [m] and normal (3,).  `volumes`: the robot's shapes, then
+    the world's objects.  The length is the number of contacts.
+    """
 
     def __init__(self, scene: Scene) -> None:
         pose: Pose = Model(scene.robot, scene.world).evaluate(scene.q)
@@ -73,12 +83,15 @@ class ModelContacts:
         return sum(map(len, self.contacts))
 
     def separation(self, pose: int, pair: Pair, direction: Array) -> float:
-        """Return how far [m] the first volume must move along the unit vector (3,) to leave the second."""
+        """Return how far [m] the first volume of a pair must move along the unit vector `direction` (3,) to leave the second one.
+
+        `pose`: index of the pose.  `pair`: indices in `volumes`.
+        """
         (first, at), (second, there) = (self._placed(pose, index) for index in pair)
         return separation(first, at, second, there, direction)
 
     def depth_error(self) -> float:
-        """Return the largest difference [m] between a depth and the separation along its normal."""
+        """Return the largest difference [m] between the depth of a contact and the separation of its volumes along its normal."""
         return max(
             (
                 abs(self.separation(at, pair, normal) - depth)
@@ -97,7 +110,10 @@ class ModelContacts:
 
 
 def agreements(scene: Scene, with_coal: bool) -> tuple[list[Agreement], float]:
-    """Compare the model with MuJoCo, python-fcl and, on request, coal; returns that and the model's largest depth error [m]."""
+    """Compare the model with MuJoCo, python-fcl and, if `with_coal`, coal.
+
+    Returns a comparison for each peer, and the model's largest depth error [m], as of `ModelContacts.depth_error`.
+    """
     ours = ModelContacts(scene)
     peers: dict[str, Detect] = {"MuJoCo": _mujoco(scene), "python-fcl": _fcl(scene)}
     if with_coal:
@@ -106,7 +122,11 @@ def agreements(scene: Scene, with_coal: bool) -> tuple[list[Agreement], float]:
 
 
 def compared(peer: str, scene: Scene, ours: ModelContacts, detect: Detect) -> Agreement:
-    """Compare the model with one peer."""
+    """Compare the contacts `ours` of the model with those of the peer.
+
+    `detect`: takes the index of a pose; returns the peer's pairs (c, 2), depths (c,) m, and directions (c, 3) that move the first volume
+    out.
+    """
     other: list[float] = []
     differences: dict[str, list[float]] = defaultdict(list)
     beaten = 0.0
@@ -177,12 +197,19 @@ def _coal(scene: Scene) -> Detect:
 
 
 def separation(first: Volume, at: Place, second: Volume, there: Place, direction: Array) -> float:
-    """Return how far [m] the first must move along the unit vector (3,) until a plane separates it from the second."""
+    """Return how far [m] the first volume must move along a unit vector until a plane separates it from the second one.
+
+    `direction`: the unit vector (3,), root frame.  `at`, `there`: poses of the first and the second volume.
+    """
     return extent(second, there, direction) + extent(first, at, -direction)
 
 
 def extent(volume: Volume, place: Place, direction: Array) -> float:
-    """Return the support function [m]: how far the volume extends along the unit vector (3,), from the root's origin."""
+    """Return the support function [m] of a volume: the largest projection of its points on a unit vector.
+
+    `place`: pose of the volume.  `direction`: the unit vector (3,), root frame.  The projections are measured from the origin of the root
+    frame.
+    """
     position, rotation = place
     along = rotation.T @ direction
     return float(direction @ position) + _own_extent(volume, along)

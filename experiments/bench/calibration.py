@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The calibration loop: fixed work without MoBeE, the measure for times that cannot be compared with a peer.
+"""The calibration loop: fixed work without MoBeE, which measures the speed of a machine where no peer can be timed beside MoBeE.
 
 It consists of three parts of equal time: Python (calls, a dictionary, floating point numbers), NumPy with arrays of a few numbers, and
 NumPy with arrays of thousands, as in most numerical programs.  The *standard machine* does the loop in STANDARD_SECONDS.  A time that is
@@ -28,9 +28,9 @@ from numpy.typing import NDArray
 T = TypeVar("T")
 
 STANDARD_SECONDS = 0.010
-"""Time of the loop on the standard machine: one quiet core of the machine on which the requirements were set."""
+"""Processor time [s] of the calibration loop on the standard machine: one quiet core of the machine for which the requirements were set."""
 STANDARD_EXCHANGE_SECONDS = 0.016
-"""Time of the loop there for two processes that exchange a message for every portion."""
+"""Wall time [s] of the loop on the standard machine if two helper processes exchange messages for every portion, as in `Crew.exchanges`."""
 SPEED_LIFETIME = 0.5  # s for which a measured speed counts as the present one
 PORTIONS = 50  # of a loop; each is about the work of a service in a tick
 _CALLS, _SMALL, _LARGE = 380, 12, 3  # repetitions in one portion
@@ -39,12 +39,12 @@ _ANGLES = np.linspace(0.0, 3.0, 2048)
 
 
 def portion() -> float:
-    """Do a fiftieth of the loop; returns a number that depends on all of it."""
+    """Do one portion (1/50) of the calibration loop.  Returns a number that depends on all the work."""
     return _interpreted(_CALLS) + _on_small_arrays(_SMALL) + _on_large_arrays(_LARGE)
 
 
 def loop() -> None:
-    """Do the whole work."""
+    """Do the whole calibration loop once: PORTIONS (50) portions."""
     for _ in range(PORTIONS):
         portion()
 
@@ -76,7 +76,10 @@ def _on_large_arrays(count: int) -> float:
 
 
 def speed(loops: int = 3) -> float:
-    """Return the present speed of this machine as a multiple of the standard machine's: the median of some loops."""
+    """Return the present speed of this machine in multiples of the standard machine's speed.
+
+    It is STANDARD_SECONDS over the median processor time of `loops` calibration loops.
+    """
     seconds = []
     for _ in range(loops):
         start = time.process_time()
@@ -86,24 +89,27 @@ def speed(loops: int = 3) -> float:
 
 
 class Calibration:
-    """Measures the speed of this machine before and after other measurements, at most twice per second."""
+    """Measures the speed of this machine before and after other measurements; a measured speed is reused for half a second."""
 
     def __init__(self, measure_speed: Callable[[], float] = speed) -> None:
-        """`measure_speed`: by default of this process."""
+        """`measure_speed` returns the machine's speed in multiples of the standard machine's; the default measures it in this process."""
         self._measure_speed = measure_speed
         self._last, self._last_time = 0.0, -math.inf
         self.speeds: list[float] = []
-        """All measured speeds."""
+        """All speeds measured so far, in multiples of the standard machine's speed."""
 
     def around(self, run: Callable[[], T]) -> tuple[T, float]:
-        """Return the result of `run`, and the machine's speed around it; seconds times this speed are seconds on the standard machine."""
+        """Return the result of `run`, and the mean of the machine's speeds before and after it.
+
+        A time in seconds multiplied by this speed is the time on the standard machine.
+        """
         before = self._present_speed()
         result = run()
         return result, 0.5 * (before + self._present_speed())
 
     @property
     def median(self) -> float:
-        """The median of all measured speeds."""
+        """The median of all speeds measured so far, in multiples of the standard machine's speed."""
         return float(np.median(self.speeds))
 
     def _present_speed(self) -> float:
@@ -115,7 +121,7 @@ class Calibration:
 
 
 class Crew:
-    """Helper processes that do the calibration's work on request.  A context manager: they end with it."""
+    """`count` helper processes that do the calibration loop on request.  A context manager: the processes end when the context is left."""
 
     def __init__(self, count: int) -> None:
         self._ends: list[socket.socket] = []
@@ -134,11 +140,18 @@ class Crew:
         _end(self._ends, self._processes)
 
     def loops(self, count: int = 3) -> float:
-        """Return the machine's speed, in wall time, while all helpers do the loop at once."""
+        """Return the speed of this machine while all helpers do the calibration loop at the same time.
+
+        It is in multiples of the standard machine's speed: STANDARD_SECONDS over the median wall time of `count` measurements.
+        """
         return STANDARD_SECONDS / self._request(_LOOP, 1, count)
 
     def exchanges(self, count: int = 5) -> float:
-        """Return the speed if each portion is requested and answered by a message, and the next one waits for all answers."""
+        """Return the speed of this machine while processes exchange messages, in multiples of the standard machine's speed.
+
+        All helpers do a portion of the loop for each message and answer; the next message is sent after all answers.  The speed is
+        STANDARD_EXCHANGE_SECONDS over the median wall time of a loop, of `count` measurements.
+        """
         return STANDARD_EXCHANGE_SECONDS / self._request(_PORTION, PORTIONS, count)
 
     def _request(self, message: bytes, times: int, count: int) -> float:
@@ -156,10 +169,13 @@ class Crew:
 
 
 def bare_ages(rate: float, seconds: float, helpers: int = 2) -> NDArray[np.int64]:
-    """Return the ages [ticks] of the answers of a bare chain of processes: the delay that the machine's scheduling costs the live system.
+    """Measure the delay that the scheduling of this machine costs, with a chain of processes that do nothing but calibration portions.
 
-    Once a tick this process reads the chain's newest answer, notes how many ticks ago its request was sent, does a portion and sends
-    the tick to the first helper; each helper does a portion and passes the tick on.
+    At each tick (`rate` [Hz], for `seconds`) this process reads the newest tick number that has passed through the chain and records its
+    age.  Then it does a portion of the loop and sends the number of the tick to the first helper.  Each helper does a portion and sends the
+    number to the next one.
+
+    Returns the ages [ticks] in all ticks, shape (round(rate * seconds),).
     """
     pairs = [socket.socketpair() for _ in range(helpers + 1)]
     processes = [_start_helper(pairs[number][1], pairs[number + 1][0]) for number in range(helpers)]

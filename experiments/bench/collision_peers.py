@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """python-fcl and coal on the benchmark's scenes.
 
-python-fcl is asked only whether each pair touches, which is the cheapest of its queries.
+python-fcl computes only whether each pair touches, which is the fastest of its queries.
 """
 
 from __future__ import annotations
@@ -40,7 +40,10 @@ class _FclScene:
 
 
 class FclPairs(_FclScene):
-    """Detection that tests every pair, one after the other."""
+    """Collision detection by python-fcl that tests every pair of volumes, one after the other.
+
+    The length is the number of tested pairs.
+    """
 
     def __init__(self, robot: Robot, snapshot: Snapshot) -> None:
         super().__init__(robot, snapshot)
@@ -53,14 +56,17 @@ class FclPairs(_FclScene):
         return len(self._pairs)
 
     def detect(self, transforms: Array) -> int:
-        """Return how many pairs touch in the pose of `transforms` (L, 4, 4)."""
+        """Return the number of pairs that touch in one pose.  `transforms`: poses of the links (L, 4, 4), root frame."""
         self.place(transforms)
         request, result, collide = self._request, self._result, fcl.collide
         return sum(collide(a, b, request, result) > 0 for a, b in self._pairs)
 
 
 class FclTrees(_FclScene):
-    """Detection by trees of axis-aligned boxes, one for the robot and one for the world; a callback tests pairs whose boxes meet."""
+    """Collision detection by python-fcl with trees of axis-aligned boxes, one for the robot and one for the world.
+
+    A pair is tested only if the boxes of its volumes meet.
+    """
 
     def __init__(self, robot: Robot, snapshot: Snapshot) -> None:
         super().__init__(robot, snapshot)
@@ -75,7 +81,7 @@ class FclTrees(_FclScene):
         self._has_world = bool(self.objects)
 
     def detect(self, transforms: Array) -> int:
-        """Return how many pairs touch in the pose of `transforms` (L, 4, 4)."""
+        """Return the number of pairs that touch in one pose.  `transforms`: poses of the links (L, 4, 4), root frame."""
         self.place(transforms)
         self._robot.update()
         touching = [0]
@@ -95,10 +101,13 @@ def _fcl_object(volume: Shape | WorldObject) -> Any:
 
 
 class CoalPeer:
-    """A robot and the objects of a world as Pinocchio's models, with the same tested pairs."""
+    """A robot and the objects of a world as models of Pinocchio, with the pairs that MoBeE tests; coal detects the contacts.
+
+    `pairs` (P, 2): indices of the tested volumes: the robot's shapes come first, then the objects.
+    """
 
     def __init__(self, robot: Robot, snapshot: Snapshot) -> None:
-        """Build the models; raises NotInstalled if coal, which is installed with Pinocchio, is missing."""
+        """Build the models.  Raises NotInstalled if coal, which is installed with Pinocchio, is missing."""
         coal, pinocchio = (import_peer(module, "coal", extra="dev") for module in ("coal", "pinocchio"))
         self._pin, self._coupling = pinocchio, robot.coupling
         first, second, _ = tested_pairs(robot, snapshot, NO_HANDS)
@@ -111,7 +120,11 @@ class CoalPeer:
         make_searches_precise(self._found)
 
     def touching(self, q: Array) -> tuple[Ints, Array, Array]:
-        """Return the pairs (c, 2) of volumes that touch in pose q (n,), depths (c,) m and directions (c, 3) that move the first out."""
+        """Return the contacts in pose q (n,) rad.
+
+        They are given as pairs (c, 2) of volumes, depths (c,) m, and unit vectors (c, 3), root frame, along which the first volume moves
+        out of the second.
+        """
         matrix, offset = self._coupling
         pin = self._pin
         pin.computeCollisions(self._model, self._data, self._geometry, self._found, matrix @ q + offset, False)

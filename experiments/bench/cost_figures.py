@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures of the cost of the model, the plant and plans against their size: `mobee bench model|plant|vi --figure FILE`."""
+"""Figures of the cost of the model, of the plant and of plans for various sizes: `mobee bench model|plant|vi --figure FILE`."""
 
 from __future__ import annotations
 
@@ -46,7 +46,11 @@ PLAN_STYLES = {  # colour, line
 
 @dataclass(frozen=True, slots=True)
 class CostFigure:
-    """The functions of one figure: `measure(quick, rounds)` returns curves, `draw` plots them on two axes."""
+    """How one figure is made.
+
+    `measure(quick, rounds)`: measures and returns the curves, {curve: {size: {name: cost}}}.  `draw(left, right, curves)`: draws them on
+    two Matplotlib axes.  `height`: of the figure, inches.  `share_y`: whether both axes have the same y axis.
+    """
 
     measure: Callable[..., Curves]
     draw: Callable[[Any, Any, Curves], None]
@@ -54,7 +58,11 @@ class CostFigure:
     share_y: bool
 
     def write(self, path: Path, quick: bool, rounds: int | None = None) -> Curves:
-        """Measure, and write the figure; returns the curves.  Raises MatplotlibMissing before anything is measured."""
+        """Measure the curves, write the figure to `path`, and return the curves.
+
+        `quick`: fewer repetitions and sizes.  `rounds`: repetitions; None: the default.  Raises MatplotlibMissing before anything is
+        measured.
+        """
         figure = new_figure(9.0, self.height)
         curves = self.measure(quick, rounds)
         left, right = figure.subplots(1, 2, sharey=self.share_y)
@@ -79,7 +87,11 @@ def _measured(points: list[tuple[str, float]]) -> Iterator[Iterator[tuple[str, f
 
 
 def model_costs(quick: bool, rounds: int | None = None, poses: int = 500) -> Curves:
-    """Return medians [us per pose] against the number of boxes and of primitives; raises NotInstalled without MuJoCo."""
+    """Measure the cost of evaluating a pose of the model and of its peers, for several numbers of boxes and of primitives.
+
+    Returns {"boxes" or "primitives": {number: {contestant: median processor time [us] per pose}}}.  `poses`: poses per round.  `rounds`:
+    None for 9, or for 3 if `quick`.  Raises NotInstalled without MuJoCo or python-fcl.
+    """
     rounds = rounds or (3 if quick else 9)
     curves: Curves = {"boxes": {}, "primitives": {}}
     points: list[tuple[str, float]] = [("boxes", size) for size in BOXES]
@@ -93,7 +105,7 @@ def model_costs(quick: bool, rounds: int | None = None, poses: int = 500) -> Cur
 
 
 def draw_model_costs(left: Any, right: Any, curves: Mapping[str, Any]) -> None:
-    """Draw the cost of a pose: left against boxes, right against primitives."""
+    """Draw the curves of `model_costs`: cost of a pose over the number of boxes (left axes) and of primitives (right axes)."""
     titles = {"boxes": "objects around 129 primitives", "primitives": f"primitives among {BOXES_OF_PRIMITIVES} objects"}
     for axes, (curve, title) in zip((left, right), titles.items(), strict=True):
         found = curves[curve]
@@ -116,7 +128,11 @@ def _counts_axis(axes: Any, counts: tuple[int, ...]) -> None:
 
 
 def plant_costs(quick: bool, rounds: int | None = None) -> Curves:
-    """Return the processor time of one arm against tick and number of objects: us per tick, and ms per second of plant time."""
+    """Measure the processor time of a plant with one arm, for several ticks [s] and numbers of objects.
+
+    Returns {"tick" or "objects": {size: {"us_per_tick": ..., "ms_per_second": ...}}}, the second per second of the plant's time.  `rounds`
+    is not used.
+    """
     curves: Curves = {"tick": {}, "objects": {}}
     points: list[tuple[str, float]] = [("tick", dt) for dt in TICKS]
     with _measured(points + [("objects", count) for count in OBJECTS]) as sizes:
@@ -128,7 +144,7 @@ def plant_costs(quick: bool, rounds: int | None = None) -> Curves:
 
 
 def draw_plant_costs(left: Any, right: Any, curves: Mapping[str, Any]) -> None:
-    """Draw the cost of the plant: left against the tick, right against objects."""
+    """Draw the curves of `plant_costs`: cost over the length of the tick (left axes) and over the number of objects (right axes)."""
     ticks, objects = curves["tick"], curves["objects"]
     left.plot([1e3 * dt for dt in ticks], [one["ms_per_second"] for one in ticks.values()], "C0.-")
     left.set_xlabel("control tick [ms]")
@@ -147,7 +163,11 @@ def draw_plant_costs(left: Any, right: Any, curves: Mapping[str, Any]) -> None:
 
 
 def plan_costs(quick: bool, rounds: int | None = None) -> Curves:
-    """Return medians [us per plan] against the number of states and the discount; raises NotInstalled without quantecon."""
+    """Measure the cost of a plan by all solvers, for several numbers of states and discounts.
+
+    Returns {"states" or "discount": {size: {solver: median processor time [us] per plan}}}.  `rounds` is not used.  Raises NotInstalled
+    without quantecon.
+    """
     curves: Curves = {"states": {}, "discount": {}}
     known = vi.after_transitions(1000, 50)
     points: list[tuple[str, float]] = [("discount", at) for at in DISCOUNTS]
@@ -164,7 +184,7 @@ def plan_costs(quick: bool, rounds: int | None = None) -> Curves:
 
 
 def draw_plan_costs(left: Any, right: Any, curves: Mapping[str, Any]) -> None:
-    """Draw the cost of a plan: left against states, right against the horizon."""
+    """Draw the curves of `plan_costs`: cost over the number of states (left axes) and over 1 / (1 - discount) (right axes)."""
     horizon = {1.0 / (1.0 - at): one for at, one in curves["discount"].items()}
     for axes, found in ((left, curves["states"]), (right, horizon)):
         for name, (color, line) in PLAN_STYLES.items():

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Edge checks of a roadmap: the time for the thesis' 400 000 poses, for each edge once, and for the edges near a change (thesis 4.3.3).
 
-The roadmap is the thesis' pre-grasp map: a palm over the table every few millimetres, 8 neighbours (figure 4.8).
+The roadmap is the thesis' pre-grasp map: the right palm above the table, one vertex every few millimetres, 8 neighbours (figure 4.8).
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ REQUIREMENTS = (
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Settings: the spacing of the roadmap [m], and the number of repetitions."""
+    """Settings of the benchmark.  `spacing`: distance between vertices of the roadmap [m].  `rounds`: repetitions of the measurements."""
 
     spacing: float = 0.008  # 5300 vertices
     rounds: int = 5
@@ -47,12 +47,16 @@ QUICK = Settings(spacing=0.02, rounds=1)
 
 
 def palm_map(spacing: float) -> Roadmap:
-    """Return the map with that spacing [m], up to the motors' limits, each pose joined to the nearest 8."""
+    """Build the pre-grasp roadmap with this spacing [m].  Each vertex has edges to its 8 nearest; postures may be at the motors' limits."""
     return build(replace(pregrasp(), spacing=spacing, margin=0.0), "least_squares", neighbours=NEIGHBOURS)
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """Measure, and return all numbers and the verdict; times are processor time, medians of the rounds."""
+    """Run this benchmark and return its result.
+
+    Keys: "vertices" and "edges", their numbers; for each method the processor time [s] and the number of poses, medians of the rounds;
+    "requirements" and "passed", as of `verdicts.verdict`.
+    """
     with one_core() as core, Progress() as progress:
         progress.show(0.0, "making the map")
         trm = palm_map(settings.spacing)
@@ -115,7 +119,7 @@ def _check_every_pose(model: mobee.Model, trm: Roadmap) -> tuple[Flags, int]:
 
 
 def report(result: dict[str, Any]) -> str:
-    """Format the measurements."""
+    """Return the result of `measure` as text: a table with one line for each method, then the requirements."""
     lines = [
         f"A palm over the table every {1e3 * result['spacing']:g} mm: {result['vertices']} vertices, {result['edges']} undirected edges,",
         f"poses {1e3 * result['step']:g} mm apart; processor time of one core:",

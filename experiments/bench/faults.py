@@ -3,10 +3,10 @@
 
 Claim: after a process is killed the parts that depend on it hold within 30 ms, after it freezes within 120 ms (95 of 100, on a machine that
 does nothing else); every part follows commands again within 5 s of the last fault; no transition is lost, doubled or mixed; no motor is
-faster than the gate allows, and none obeys a command that answers a tick of more than 100 ms ago.  Each schedule is drawn from its number
-and performed on one running system; from one that breaks a promise, faults are removed as long as it still does.  Times are judged only if
-the load was low, and in real time; the load is part of the result.  With a quiet period before the schedules: faults cost at most a fifth
-of the transitions.  Run time: about 10 s for each schedule.
+faster than the gate allows, and none obeys a command that answers a tick of more than 100 ms ago.  Each schedule is drawn with its number
+as seed, and all are performed on one running system.  If a schedule breaks a guarantee, faults can be removed from it while a guarantee is
+still broken (`shrink`).  Times are judged only in real time and if the load was low; the load is part of the result.  With a quiet period
+before the schedules: faults cost at most a fifth of the transitions.  Run time: about 10 s for each schedule.
 """
 
 from __future__ import annotations
@@ -46,7 +46,12 @@ _ALONE = 1.0  # s between two faults, so that their effects can be distinguished
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How many schedules, the number of the first, how long each lasts [s], and the mean time between two faults [s]."""
+    """Settings of the benchmark.
+
+    `schedules`: number of schedules.  `seed`: number of the first one.  `seconds`: duration of each [s].  `period`: mean time between two
+    faults [s].  `shrink`: maximum number of performances to shorten a schedule that breaks a guarantee.  `scenario`: of the system.
+    `quiet`: time without faults [s] before the first schedule, whose transitions are compared with those under faults; 0: no comparison.
+    """
 
     schedules: int = 20
     seed: int = 1
@@ -139,7 +144,12 @@ def _alone(schedule: Sequence[Fault], times: Sequence[float]) -> Iterator[tuple[
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """Perform the schedules, and return all measurements and the verdict; raises LaunchFailed."""
+    """Perform the schedules on one system and return the result; raises LaunchFailed.
+
+    Main keys: "hold_ms", times until parts hold, by kind of fault; "back_s", times until all parts follow commands again [s];
+    "transitions", numbers of kept and lost ones; "broken", the broken guarantees as text; "rows", the measurements of each schedule;
+    "passed".
+    """
     rows: list[dict[str, Any]] = []
     with Progress() as progress, tempfile.TemporaryDirectory() as scratch, running(Path(scratch), settings.scenario) as system:
         with open_client(system.endpoint) as session:
@@ -218,7 +228,7 @@ def _summary(values: list[float]) -> dict[str, Any]:
 
 
 def report(result: dict[str, Any]) -> str:
-    """Format the measurements."""
+    """Return the result of `measure` as text: times, counts of transitions, and the broken guarantees."""
     kept = result["transitions"]
     lines = [
         f"{result['schedules']} schedules from number {result['seed']}, {result['faults']} faults in {result['seconds']:.0f} s; "

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Nearly valid messages, calls and tokens to a live system, see `experiments.kit.live.malformed`: which end, and how memory grows.
+"""Nearly valid messages, calls and tokens to a live system (`experiments.kit.live.malformed`): which processes end, and how memory grows.
 
 Claim: no process ends, none is ended by the launcher, the memory of each has grown by less than 20 MB when the queues are empty again, and
-afterwards every agent learns.
-The robot moves by the motor model at 100 Hz, with its three agents; no monitor runs.  Messages are not dropped: a service that does not
-read fast enough delays the sender.  Run time: some minutes for a million on 2 cores.
+afterwards every agent learns.  The robot moves by the motor model at 100 Hz, with its three agents; no monitor runs.  Messages are not
+dropped: a service that does not read fast enough delays the sender.  Run time: some minutes for a million on 2 cores.
 """
 
 from __future__ import annotations
@@ -44,7 +43,7 @@ _PATIENCE = 90.0  # s until a process answers, and until every agent has learned
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """The number of messages, calls and tokens together, and the first seed."""
+    """Settings of the benchmark.  `messages`: number of messages, calls and tokens together.  `seed`: the first of the senders' seeds."""
 
     messages: int = 1_000_000
     seed: int = 1
@@ -54,7 +53,11 @@ QUICK = Settings(messages=40_000)
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """Send all messages; return the numbers sent and refused, and the growth of the processes' memory; raises LaunchFailed."""
+    """Send all messages and return the result; raises LaunchFailed.
+
+    Main keys: "sent", numbers by kind; "refused", "grown_mb" and "largest_growth_mb", by process; "ended", the processes that ended;
+    "learned", the agents that learned again afterwards; "passed".
+    """
     sent: Counter[str] = Counter()
     begun = time.monotonic()
     with Progress() as progress, tempfile.TemporaryDirectory() as scratch, running(Path(scratch), "kinematic") as system:
@@ -144,7 +147,7 @@ def _transitions(system: System) -> Counter[str]:
 
 
 def report(result: dict[str, Any]) -> str:
-    """Format the measurements."""
+    """Return the result of `measure` as text: a table with one line for each process."""
     sent = ", ".join(f"{number} {kind}" for kind, number in result["sent"].items())
     lines = [f"Sent in {result['seconds']:.0f} s: {sent}; load of the machine {result['load']:.1f}"]
     lines.append(f"{'process':<20}{'refused':>10}{'memory grown, MB':>18}{'largest growth':>18}")

@@ -37,7 +37,7 @@ REQUIREMENTS = (
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Settings: steps of each environment in a round, and rounds."""
+    """Settings of the benchmark.  `steps`: steps of each environment in a round.  `rounds`: number of rounds; the median counts."""
 
     steps: int = 500
     rounds: int = 7  # the median counts
@@ -47,7 +47,7 @@ QUICK = Settings(steps=100, rounds=2)
 
 
 class Player:
-    """Random actions in an environment, or in a vector of them, drawn in advance."""
+    """Performs random actions, drawn in advance, in an environment or in a vector of environments."""
 
     def __init__(self, env: Any, steps: int) -> None:
         self._env, self._count = env, getattr(env, "num_envs", 1)
@@ -57,11 +57,11 @@ class Player:
 
     @property
     def steps(self) -> int:
-        """Steps of all environments in one `run`."""
+        """The number of steps in one `run`, summed over all environments of a vector."""
         return len(self._actions) * self._count
 
     def run(self) -> None:
-        """Do the steps; an episode that ends begins again."""
+        """Perform all actions.  A single environment is reset when its episode ends; a vector resets its environments itself."""
         for action in self._actions:
             _, _, over, cut, _ = self._env.step(action)
             if self._count == 1 and (over or cut):
@@ -69,7 +69,11 @@ class Player:
 
 
 def players(steps: int) -> dict[str, Player]:
-    """Return a player for each environment; raises NotInstalled without Gymnasium or its MuJoCo environments."""
+    """Return a player for each environment, by the name of the environment (the keys of UNITS).
+
+    `steps`: of each player in a run; the batch of Reach-v0 makes four times as many.  Raises NotInstalled without Gymnasium, MuJoCo or
+    imageio.
+    """
     gymnasium = import_peer("gymnasium", "Gymnasium")
     for package, name in (("mujoco", "MuJoCo"), ("imageio", "imageio, which Gymnasium's MuJoCo environments import")):
         import_peer(package, name)
@@ -86,7 +90,11 @@ def players(steps: int) -> dict[str, Player]:
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """Measure, and return all numbers and the verdict; raises NotInstalled."""
+    """Run this benchmark and return its result; raises NotInstalled without Gymnasium, MuJoCo or imageio.
+
+    Main keys: "steps_per_second" and "standard" (the same on the standard machine), medians by environment; "times_humanoid" and
+    "times_reacher", rate of the batch of Reach-v0 over that of the peer; "requirements" and "passed".
+    """
     playing, speeds = players(settings.steps), Calibration()
     found: dict[str, list[float]] = {name: [] for name in playing}
     standard: dict[str, list[float]] = {name: [] for name in playing}
@@ -106,7 +114,7 @@ def measure(settings: Settings) -> dict[str, Any]:
 
 
 def report(result: dict[str, Any]) -> str:
-    """Format the measurements."""
+    """Return the result of `measure` as text: a table with one line for each environment, then the requirements."""
     lines = [
         f"Random actions; processor time {cores_text(result['core'])},",
         f"rounds: {result['rounds']} (the median counts).",

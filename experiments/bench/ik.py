@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Inverse kinematics: how often and how fast a pose is found for a palm among boxes, beside mink and the thesis' rivals."""
+"""Inverse kinematics: how often and how fast solvers find a pose for a palm among boxes; the library's, mink and the thesis' rivals."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ REQUIREMENTS = (
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Settings: the numbers of targets for torso and arm, for all motors, and for the peer solvers."""
+    """Numbers of targets: `targets` for torso and arm, `whole` for all 41 motors, `rivals` for each of the thesis' rivals."""
 
     targets: int = 300
     whole: int = 60
@@ -68,7 +68,11 @@ QUICK = Settings(targets=20, whole=5, rivals=5)
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """Measure, and return all numbers and the verdict; raises NotInstalled without cma, mink or MuJoCo."""
+    """Run this benchmark and return its result; raises NotInstalled without cma, mink or MuJoCo.
+
+    Main keys: "rows", the result of `Tries.row` by solver, with "times_cma" (time of CMA-ES over that of the solver); "requirements" and
+    "passed".
+    """
     load_cma()
     load_mink()
     model = scene()
@@ -95,7 +99,7 @@ def measure(settings: Settings) -> dict[str, Any]:
 
 
 def report(result: dict[str, Any]) -> str:
-    """Format the measurements."""
+    """Return the result of `measure` as text: a table with one line for each solver, then the requirements."""
     lines = [
         "Right palm among 100 boxes: 5 mm, 5 degrees, no contact; torso and arm move.",
         "Median / 95 % of a target; processor time of one core; times faster than CMA-ES:",
@@ -115,7 +119,7 @@ def _three_digits(value: float) -> str:
 
 
 def scene() -> mobee.Model:
-    """Return the iCub among the first boxes of the model's benchmark that do not touch it at home."""
+    """Return a model of the iCub among BOXES (100) boxes: the first boxes of the model's benchmark that do not touch the robot at home."""
     robot, world = mobee.load_robot("icub"), mobee.World()
     model = mobee.Model(robot, world)
     candidates = boxes_world(1000).snapshot.objects
@@ -132,7 +136,7 @@ def scene() -> mobee.Model:
 
 
 def targets(model: mobee.Model, count: int, seed: int = 0) -> list[Target]:
-    """Return the palm's poses in random postures of torso and arm without a contact: all can be reached."""
+    """Return `count` poses of the palm that can be reached: those in random postures of torso and arm without a contact."""
     robot, rng = model.robot, np.random.default_rng(seed)
     columns = [*range(robot.part("torso").start, len(robot.part("torso"))), *(robot.motor_index(name) for name in MOTORS[1:])]
     low, high = robot.limits[columns].T
@@ -147,12 +151,16 @@ def targets(model: mobee.Model, count: int, seed: int = 0) -> list[Target]:
 
 
 def fine_target(aim: Target) -> Target:
-    """Return the target with tolerances of 1 mm and 1 degree."""
+    """Return the same pose with tolerances of 1 mm and 1 degree instead of its own."""
     return replace(aim, metres=0.001, radians=float(np.deg2rad(1.0)))
 
 
 def library(model: mobee.Model, method: Literal["hybrid", "nes"], motors: Motors) -> Solve:
-    """Return `mobee.solve_ik` as a solver."""
+    """Return a solver that calls `mobee.solve_ik`.
+
+    A solver is called with a target and a seed, and returns whether it found a pose and how many poses it evaluated.  `motors`: names of
+    the motors that may move; None: all.
+    """
 
     def solve(aim: Target, seed: int) -> tuple[bool, int]:
         ik = mobee.solve_ik(model, aim.costs(), seed=seed, motors=motors, method=method, evaluations=MAX_EVALUATIONS)
@@ -162,7 +170,11 @@ def library(model: mobee.Model, method: Literal["hybrid", "nes"], motors: Motors
 
 
 def rival(model: mobee.Model, name: str, motors: Motors) -> Solve:
-    """Return one of RIVALS as a solver."""
+    """Return one of the thesis' rivals as a solver.  `name`: a key of RIVALS.
+
+    A solver is called with a target and a seed, and returns whether it found a pose and how many poses it evaluated.  `motors`: names of
+    the motors that may move; None: all.
+    """
 
     def solve(aim: Target, seed: int) -> tuple[bool, int]:
         problem = Problem(model, aim.costs(), None, motors)
@@ -172,7 +184,10 @@ def rival(model: mobee.Model, name: str, motors: Motors) -> Solve:
 
 
 def mink(model: mobee.Model) -> Solve:
-    """Return mink as a solver, on torso and arm; raises NotInstalled."""
+    """Return a solver that calls mink and moves torso and arm; raises NotInstalled without mink or MuJoCo.
+
+    A solver is called with a target and a seed, and returns whether it found a pose and how many poses it evaluated.
+    """
     peer = MinkPeer(model.robot)
 
     def solve(aim: Target, seed: int) -> tuple[bool, int]:
@@ -183,14 +198,21 @@ def mink(model: mobee.Model) -> Solve:
 
 
 def timed(solve: Solve, aim: Target, seed: int) -> tuple[bool, int, float]:
-    """Solve one target; returns whether it was reached, the evaluations and the processor time [ms]."""
+    """Solve the inverse kinematics of one target.
+
+    Returns whether a pose was found, the number of evaluations, and the processor time [ms].
+    """
     (reached, evaluations), seconds = processor_time(lambda: solve(aim, seed))
     return reached, evaluations, 1e3 * seconds
 
 
 @dataclass(slots=True)
 class Tries:
-    """The costs of a solver for each target, in order, reached or not."""
+    """What a solver needed for each of its targets, in order, whether it found a pose or not.
+
+    `reached`: whether it found one.  `evaluations`: number of evaluated poses.  `ms`: processor time [ms].  `standard_ms`: the same on the
+    standard machine.
+    """
 
     reached: list[bool] = field(default_factory=list)
     evaluations: list[int] = field(default_factory=list)
@@ -198,7 +220,7 @@ class Tries:
     standard_ms: list[float] = field(default_factory=list)  # on the standard machine, see calibration.py
 
     def add(self, solve: Solve, aim: Target, seed: int, speeds: Calibration) -> None:
-        """Solve one more target."""
+        """Solve one more target and append the result.  `speeds` measures the speed of this machine."""
         (reached, evaluations, ms), speed = speeds.around(lambda: timed(solve, aim, seed))
         self.reached.append(reached)
         self.evaluations.append(evaluations)
@@ -206,7 +228,11 @@ class Tries:
         self.standard_ms.append(ms * speed)
 
     def row(self) -> dict[str, float]:
-        """Return the share of targets reached, and evaluations and processor time of a target, median and 95 %."""
+        """Return the statistics of all tries.
+
+        Keys: "targets", their number; "reached", the share that the solver reached; "evaluations", "ms" and "standard_ms", medians over the
+        targets, and their 95 % quantiles with the ending "_95".
+        """
         row: dict[str, float] = {"targets": len(self.reached), "reached": float(np.mean(self.reached))}
         for key in ("evaluations", "ms", "standard_ms"):
             values = getattr(self, key)
@@ -216,7 +242,7 @@ class Tries:
 
 @dataclass(frozen=True, slots=True)
 class Entrant:
-    """A solver and the targets that it is given."""
+    """A solver (`solve`) and the targets that it must solve (`aims`)."""
 
     solve: Solve
     aims: Sequence[Target]
@@ -225,7 +251,8 @@ class Entrant:
 def solve_by_turns(entrants: Mapping[str, Entrant], speeds: Calibration, show: Callable[[int, str], None]) -> dict[str, Tries]:
     """Solve all targets, a few with each solver in turn, so that a slow minute of the machine affects all solvers equally.
 
-    `show` is called with the number of targets done and the solver's name.
+    `entrants`: by the name of the solver, as the result.  `speeds` measures the speed of this machine.  `show` is called with the number of
+    targets done and the name of the solver.
     """
     for one in entrants.values():
         one.solve(one.aims[0], 0)  # fills caches, does lazy set-up

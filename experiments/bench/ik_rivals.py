@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Solvers of inverse kinematics that the library's are compared with, on the same problems: mink and the thesis' rivals.
+"""Solvers of inverse kinematics for comparison with the library's, on the same problems: mink and the thesis' rivals.
 
-The rivals (thesis 3.1.1) are CMA-ES, simulated annealing, a particle filter and xNES; each ends at the first good pose.  mink is
-differential inverse kinematics on MuJoCo by quadratic programs, here with restarts and our contact check.
+The rivals (thesis 3.1.1) are CMA-ES, simulated annealing, a particle filter and xNES; each ends at the first pose within all tolerances.
+mink computes differential inverse kinematics on MuJoCo by quadratic programs; here it is restarted, and its poses are tested for contacts
+by MoBeE.
 """
 
 from __future__ import annotations
@@ -44,7 +45,10 @@ STOP_SHARE = 0.9  # of the tolerances, at which mink stops
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Target:
-    """A pose of the palm, position (3,) m and rotation (3, 3), and the tolerances of both."""
+    """A target pose of the right palm and its tolerances.
+
+    `position` (3,) m and `rotation` (3, 3), root frame.  `metres` and `radians`: tolerances of position and orientation.
+    """
 
     position: Array
     rotation: Array
@@ -52,7 +56,7 @@ class Target:
     radians: float = float(np.deg2rad(5.0))
 
     def costs(self) -> list[Term]:
-        """Return the costs of being there within the tolerances, without a contact, near home."""
+        """Return the costs of a pose of the robot: position and orientation within the tolerances, no contact, and distance from home."""
         costs = mobee.costs
         return [
             costs.position(MARKER, self.position, self.metres),
@@ -63,7 +67,10 @@ class Target:
 
 
 def xnes(problem: Problem, seed: int, most: int) -> Array | None:
-    """Search by NES as published (Glasmachers 2010), with its default population, within our limits and with our restarts."""
+    """Search for a pose by xNES as published (Glasmachers 2010), with its default population and with the library's limits and restarts.
+
+    Returns a pose (n,) rad within all tolerances, or None after `most` evaluations.
+    """
     low, high = problem.limits.T
     start, restart = problem.start[problem.free], Restart(patience=XNES_PATIENCE)
     search = Search(start, STD * (high - low), problem.limits, restart, method="xnes", seed=seed)
@@ -71,9 +78,10 @@ def xnes(problem: Problem, seed: int, most: int) -> Array | None:
 
 
 def cma(problem: Problem, seed: int, most: int, batched: bool) -> Array | None:
-    """Search by CMA-ES with its default population; it restarts at a random posture when it has stopped by its own criteria.
+    """Search for a pose by CMA-ES with its default population.  It restarts at a random posture whenever its own criteria stop it.
 
-    `batched`: the poses of a generation are evaluated at once, not one by one.
+    `batched`: the poses of a generation are evaluated in one batch, not one by one.  Returns a pose (n,) rad within all tolerances, or None
+    after `most` evaluations.
     """
     rng = np.random.default_rng(seed)
     start = _units(problem, problem.start[problem.free])
@@ -89,7 +97,11 @@ def cma(problem: Problem, seed: int, most: int, batched: bool) -> Array | None:
 
 
 def annealing(problem: Problem, seed: int, most: int) -> Array | None:
-    """Search by simulated annealing: one pose at a time; steps and temperature fall together, then it restarts at the best pose."""
+    """Search for a pose by simulated annealing, one pose at a time.
+
+    The size of the steps and the temperature decrease together during ANNEALING_PERIOD (4000) poses; then the search restarts at the best
+    pose.  Returns a pose (n,) rad within all tolerances, or None after `most` evaluations.
+    """
     rng = np.random.default_rng(seed)
     best = here = there = _units(problem, problem.start[problem.free])
     cost = least = np.inf
@@ -116,7 +128,11 @@ def annealing(problem: Problem, seed: int, most: int) -> Array | None:
 
 
 def particles(problem: Problem, seed: int, most: int) -> Array | None:
-    """Search by a particle filter: resample by the costs, add noise that shrinks; when it is small, restart with uniform particles."""
+    """Search for a pose by a particle filter.
+
+    In each generation particles are resampled by their costs, and noise is added.  The noise decreases; when it is small, the search
+    restarts with uniform random particles.  Returns a pose (n,) rad within all tolerances, or None after `most` evaluations.
+    """
     rng = np.random.default_rng(seed)
     noise, places = 0.0, rng.uniform(size=(PARTICLES, len(problem.free)))
 
@@ -158,12 +174,15 @@ def _poses(problem: Problem, units: Array) -> Array:
 
 
 def load_mink() -> Any:
-    """Return the package mink; raises NotInstalled."""
+    """Return the imported package mink; raises NotInstalled if it is missing."""
     return import_peer("mink", "mink")
 
 
 class MinkPeer:
-    """The chain from the base to the palm, without volumes: the problem checks for contacts in the poses that mink finds."""
+    """The chain of joints from the base to the right palm as a model for mink, without collision volumes.
+
+    Contacts are tested by the problem, in the poses that mink finds.
+    """
 
     def __init__(self, robot: Robot) -> None:
         self._mink = load_mink()
@@ -173,9 +192,10 @@ class MinkPeer:
         self._limits = [self._mink.ConfigurationLimit(model)]
 
     def solve(self, problem: Problem, target: Target, seed: int, most: int) -> Array | None:
-        """Return a pose (n,) within all tolerances, or None after `most` evaluations.
+        """Return a pose (n,) rad within all tolerances, or None after `most` evaluations.
 
-        Starts as our least squares do: at home, then by turns near home and anywhere.  Steps and contact checks count as evaluations.
+        The starts are those of the library's least squares: first home, then by turns near home and anywhere.  Steps and contact checks
+        count as evaluations.
         """
         rotation = self._mink.SO3.from_matrix(target.rotation)
         self._task.set_target(self._mink.SE3.from_rotation_and_translation(rotation, target.position))

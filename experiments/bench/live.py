@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The live system in real time: jitter of the controller's period and age of the command in force, at several rates.
 
-Claim: on two cores the age is at most 2 ticks in 99 of 100 ticks up to 200 Hz, 3 up to 500 Hz and 5 at 1 kHz.  Age and jitter are the
-services' own numbers; a tick in hold counts as held and not as an age.  Before and after every run a bare chain of processes that do a
-little each (calibration.py) measures the delay of the machine's own scheduling: where that is longer than on the standard machine, the
-ages may be as many times longer.  Run time: `seconds` and a start for every rate, on a machine that does nothing else.
+Claim: on two cores the age is at most 2 ticks in 99 of 100 ticks up to 200 Hz, 3 up to 500 Hz and 5 at 1 kHz.  Age and jitter are measured
+by the services; ticks in which a part holds are counted separately and have no age.  Before and after every run, a bare chain of processes
+that do a little each (calibration.py) measures the delay that the machine's scheduling causes.  If this delay is k times that of the
+standard machine, the allowed ages are k times larger.  Run time: `seconds` and a start for every rate, on a machine that does nothing else.
 """
 
 from __future__ import annotations
@@ -27,7 +27,11 @@ _COLUMNS = ("rate", "age p50", "p99", "bare", "allowed", "most", "jitter p50", "
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Rates [Hz], how long each run lasts [s], and the robot: kinematic, pybullet or mujoco."""
+    """Settings of the benchmark.
+
+    `rates`: rates of the control loop [Hz].  `seconds`: duration of each run [s].  `backend`: the robot: "kinematic", "pybullet" or
+    "mujoco".
+    """
 
     rates: Sequence[int] = (100, 200, 500, 1000)
     seconds: float = 30.0
@@ -35,7 +39,7 @@ class Settings:
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """Run the system at each rate, and return all numbers and the verdict; raises LaunchFailed."""
+    """Run the system at each rate and return the result; raises LaunchFailed.  Keys: "runs", those of `judged_run`, and "passed"."""
     runs = []
     with Progress() as progress:
         for done, rate in enumerate(settings.rates):
@@ -49,7 +53,12 @@ def measure(settings: Settings) -> dict[str, Any]:
 
 
 def judged_run(rate: int, summary: Mapping[str, Any], bare_p99: float) -> dict[str, Any]:
-    """Return the numbers and the verdict of a run whose bare chain had that age [ticks]."""
+    """Return the numbers of one run and whether its ages are small enough.
+
+    `rate`: [Hz].  `summary`: the summary of the run.  `bare_p99`: 99th percentile [ticks] of the ages of the bare chain around the run.
+    Main keys: "age_p50", "age_p99" and "age_max" [ticks]; "jitter_ms_p50" and "jitter_ms_p99"; "at_most", the largest allowed "age_p99"
+    (None above 1 kHz); "passed".
+    """
     age, controller = summary["command_age_ticks"], summary["services"]["controller"]
     most = next((ticks * max(1.0, bare_p99 / BARE_AGE[limit]) for limit, ticks in MAX_AGE.items() if rate <= limit), None)
     return {
@@ -70,7 +79,7 @@ def judged_run(rate: int, summary: Mapping[str, Any], bare_p99: float) -> dict[s
 
 
 def report(result: dict[str, Any]) -> str:
-    """Format the measurements."""
+    """Return the result of `measure` as text: a table with one line for each rate."""
     lines = [f"Live on the {result['backend']} robot, three agents, {result['seconds']:g} s each; age in ticks, jitter in ms"]
     lines.append("{:>7}{:>8}{:>4}{:>5}{:>8}{:>5}{:>11}{:>7}{:>7}{:>6}{:>6}".format(*_COLUMNS))
     for run in result["runs"]:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The live system in lockstep: how much faster than real time it runs, on the motor model alone, on PyBullet and on MuJoCo.
 
-Claim: robot_sim, model, controller and three agents, each a process, simulate at least 15 s of robot time per second on the motor model
-and 10 on PyBullet, at ticks of 20 ms, on the standard machine.  Before and after every run the speed of this machine is measured in
-messages between processes that work a little at each.  Run time: six runs of `seconds` each and their start.
+Claim: robot_sim, model, controller and three agents, each a process, simulate at least 15 s of robot time per second on the motor model and
+10 on PyBullet, at ticks of 20 ms, on the standard machine.  Before and after every run the speed of this machine is measured by processes
+that exchange messages and do a little work for each.  Run time: six runs of `seconds` each and their start.
 """
 
 from __future__ import annotations
@@ -20,7 +20,10 @@ from experiments.kit.live.launch import summary_of
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One run; `least` and `aim` in multiples of real time, on the standard machine."""
+    """A robot and a rate that are measured in one run.
+
+    `least`: required speed, and `aim`: desired speed, in multiples of real time on the standard machine; None: no bound.
+    """
 
     backend: str
     rate: int  # Hz
@@ -41,14 +44,17 @@ CASES = (
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Settings: the duration of each run [s], and the cases to run."""
+    """Settings of the benchmark.  `seconds`: duration of each run [s].  `cases`: the robots and rates to run."""
 
     seconds: float = 20.0
     cases: Sequence[Case] = CASES
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """Run the system in each case, and return all numbers and the verdict; raises LaunchFailed."""
+    """Run the system in each case and return the result; raises LaunchFailed.
+
+    Keys: "seconds"; "speed", the speed of this machine; "runs", the results of `judged_run`; "passed".
+    """
     runs = []
     with Progress() as progress, Crew(HELPERS) as crew:
         speeds = Calibration(crew.exchanges)
@@ -65,7 +71,12 @@ def _run(case: Case, seconds: float) -> dict[str, Any]:
 
 
 def judged_run(case: Case, summary: Mapping[str, Any], speed: float) -> dict[str, Any]:
-    """Return the numbers and the verdict of one run on a machine of that speed."""
+    """Return the numbers of one run and whether it is fast enough and repeatable.
+
+    `summary`: the summary of the run.  `speed`: speed of this machine in multiples of the standard machine's.  Main keys: "speed", in
+    multiples of real time; "standard_speed", the same on the standard machine; "repeatable", whether the summary says that the run can be
+    repeated exactly; "passed".
+    """
     lockstep, agents = summary["lockstep"], summary["agents"]
     standard = lockstep["speed"] / speed
     return {
@@ -81,7 +92,10 @@ def judged_run(case: Case, summary: Mapping[str, Any], speed: float) -> dict[str
 
 
 def engine_ratios(runs: Sequence[Mapping[str, Any]]) -> dict[int, float]:
-    """Return by rate [Hz] how many times as fast as PyBullet MuJoCo was, where both were run."""
+    """Return the speed of MuJoCo over the speed of PyBullet, by rate [Hz], for the rates at which both were run.
+
+    `runs`: results of `judged_run`.
+    """
     speeds = {(run["backend"], run["rate"]): run["standard_speed"] for run in runs}
     return {
         rate: speed / speeds["pybullet", rate]
@@ -91,7 +105,7 @@ def engine_ratios(runs: Sequence[Mapping[str, Any]]) -> dict[int, float]:
 
 
 def report(result: dict[str, Any]) -> str:
-    """Format the measurements."""
+    """Return the result of `measure` as text: a table with one line for each run."""
     lines = ["Lockstep of robot_sim, model, controller and three agents, a process each"]
     lines.append(f"{'robot':<10}{'rate':>7}{'x real time':>13}{'ticks/s':>9}{'calibrated':>12}{'at least':>10}{'aim':>5}")
     for run in result["runs"]:

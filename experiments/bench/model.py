@@ -48,12 +48,16 @@ _NOTE = (
 )
 
 Rates = dict[str, Array]
-"""Poses per second of each contestant in each round."""
+"""Poses per second of processor time in each round, shape (rounds,), by the name of the contestant."""
 
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Settings: sizes and repetitions of the measurements; `boxes`: numbers of boxes around the iCub."""
+    """Sizes and repetitions of the measurements.
+
+    `boxes`: numbers of boxes around the iCub.  `rounds`: repetitions.  `poses`: poses in a round.  `other_poses`: the same for robots of
+    other makers.  `compared_boxes` and `compared_poses`: numbers of boxes, and poses, for the comparison of the contacts.
+    """
 
     boxes: tuple[int, ...] = (0, 10, 100, 1000)
     rounds: int = 15
@@ -89,7 +93,10 @@ REQUIREMENTS = (
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """Measure, and return all numbers and the verdict; raises NotInstalled without MuJoCo."""
+    """Run this benchmark and return the result of `summarized`, together with the workload and the versions of all programs.
+
+    Raises NotInstalled without MuJoCo or python-fcl.
+    """
     load_mujoco()
     robot, with_coal = upper_body(), importlib.util.find_spec("pinocchio") is not None
     counts = sorted(set(settings.boxes))
@@ -124,9 +131,13 @@ def measure(settings: Settings) -> dict[str, Any]:
 def summarized(
     measured: Mapping[str, Mapping[int, Rates]], threads: Mapping[str, float] | None, depth_error: float, compared: Sequence[Agreement]
 ) -> dict[str, Any]:
-    """Return medians of the rates and of the ratios to the peers, the iCub's, and under "others" those of other makers; and the verdict.
+    """Return the medians of the rates and of their ratios to the peers' rates, and the verdict.
 
-    `threads`: the gains of two threads and of two processes; `depth_error`: see `agreements`.
+    `measured`: the rates by robot and number of objects.  `threads`: the gains of two threads and of two processes.  `depth_error`: the
+    model's largest depth error [m].  `compared`: the comparisons of contacts with the peers.
+
+    Keys: "poses_per_second", "times_mujoco" and "times_python_fcl", each by number of objects and contestant, for the iCub; "others", the
+    same tables for each other robot; "requirements" and "passed"; and the last three arguments.
     """
 
     def tables(found: Mapping[int, Rates]) -> dict[str, Any]:
@@ -148,7 +159,10 @@ def summarized(
 
 
 def contestants(robot: Robot, boxes: int, poses: int) -> dict[str, Contestant]:
-    """Return all contestants on the iCub, in the same world and the same poses."""
+    """Return all contestants on the same robot, world and poses, by name.
+
+    `boxes`: number of boxes in the world.  `poses`: number of poses of a run of ours and of MuJoCo; python-fcl does fewer.
+    """
     from experiments.bench.collision_peers import FclPairs, FclTrees  # raises NotInstalled without python-fcl
 
     scene = Scene(ICUB, robot, boxes_world(boxes), upper_body_poses(poses))
@@ -178,7 +192,7 @@ def contestants(robot: Robot, boxes: int, poses: int) -> dict[str, Contestant]:
 
 
 def beside_mujoco(scene: Scene) -> dict[str, Contestant]:
-    """Return ours, in a batch and one by one, and MuJoCo."""
+    """Return three contestants on a scene: our model with all poses in one batch (BATCH), pose by pose (CALL), and MuJoCo (MUJOCO)."""
     model, rows, poses = Model(scene.robot, scene.world), list(scene.q), len(scene.q)
     mujoco = MujocoPeer(scene.robot, scene.world.objects)
     angles = list(mujoco.joint_angles(scene.q))
@@ -246,7 +260,7 @@ def _workload(robot: Robot, settings: Settings) -> dict[str, int]:
 
 
 def report(result: dict[str, Any]) -> str:
-    """Format the measurements."""
+    """Return the result of `measure` as text: tables of rates, ratios and comparisons of contacts, then the requirements."""
     about = result["workload"]
     head = _wrapped(
         f"{about['motors']} motors, {about['joints']} joints, {about['primitives']} primitives, {about['pairs']} tested pairs; N boxes. "

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MuJoCo on the benchmark's scenes, kinematics and collision detection only, and its stepper on the plant's model."""
+"""MuJoCo as a peer: kinematics and collision detection on the benchmark's scenes, and its stepper on the plant's robot."""
 
 from __future__ import annotations
 
@@ -23,18 +23,21 @@ COMMAND_PERIOD = 50  # ticks between two commands
 
 
 def load_mujoco() -> Any:
-    """Return the package mujoco; raises NotInstalled."""
+    """Return the imported package mujoco; raises NotInstalled if it is missing."""
     return import_peer("mujoco", "MuJoCo")
 
 
 class MujocoPeer:
-    """A robot and the objects of a world as a MuJoCo model.  Objects and the robot's base are static: MuJoCo does not test their pairs."""
+    """A robot and the objects of a world as a MuJoCo model.
+
+    Objects and the robot's base are static, and MuJoCo does not test pairs of static bodies.
+    """
 
     def __init__(self, robot: Robot, objects: Mapping[str, WorldObject], servo: float | None = None, precise: bool = False) -> None:
         """Build the MuJoCo model.
 
-        `servo`: gain of velocity servos on all joints, for `step`; there is no gravity then.  `precise`: iterative searches continue to
-        the last digits, which takes longer than MuJoCo's defaults.
+        `servo`: gain of velocity servos on all joints [N m s/rad], for `step`, without gravity; None: no servos.  `precise`: iterative
+        searches continue to the last digits, which takes longer than MuJoCo's defaults.
         """
         self._mujoco = load_mujoco()
         self._coupling = robot.coupling
@@ -51,13 +54,16 @@ class MujocoPeer:
             self._volume[self.model.geom(name).id] = volume
 
     def joint_angles(self, q: Array) -> Array:
-        """Return MuJoCo's qpos (..., joints) of motor positions (..., n), so that the coupling is not timed."""
+        """Return MuJoCo's joint positions qpos (..., joints) rad for motor positions q (..., n) rad.
+
+        They are computed in advance, so that the conversion is not timed.
+        """
         matrix, offset = self._coupling
         order = np.argsort([self.model.joint(f"joint{index}").qposadr[0] for index in range(len(offset))])
         return np.ascontiguousarray((q @ matrix.T + offset)[..., order])
 
     def detect(self, angles: Array) -> int:
-        """Compute forward kinematics and every contact of one pose; returns the number of contact points."""
+        """Compute forward kinematics and all contacts of one pose.  `angles`: qpos (joints,) rad.  Returns the number of contact points."""
         data = self.data
         data.qpos[:] = angles
         self._mujoco.mj_kinematics(self.model, data)
@@ -65,13 +71,15 @@ class MujocoPeer:
         return int(data.ncon)
 
     def step(self, count: int) -> None:
-        """Advance by that many of the model's time steps."""
+        """Simulate `count` time steps of the MuJoCo model."""
         self._mujoco.mj_step(self.model, self.data, nstep=count)
 
     def touching(self) -> tuple[Ints, Array, Array]:
-        """Return the pairs (c, 2) of volumes in contact at the last detection, depths (c,) m and directions (c, 3) that part them.
+        """Return the contacts of the last call of `detect`.
 
-        The smaller index of a pair is first, and the direction moves it out of the other; the deepest contact point of a pair counts.
+        They are given as pairs (c, 2) of volumes, depths (c,) m, and unit vectors (c, 3), root frame.  Volumes are numbered: the robot's
+        shapes come first, then the objects.  The smaller number of a pair is first, and the unit vector moves this volume out of the other.
+        The deepest contact point of a pair counts.
         """
         contact = self.data.contact
         volumes = self._volume[np.array(contact.geom).reshape(-1, 2)]
@@ -111,7 +119,10 @@ def _add_servos(mujoco: Any, spec: Any, joints: int, gain: float) -> None:
 
 
 def us_per_tick(plant: OfflinePlant, ticks: int, seed: int = 0) -> float:
-    """Return the processor time [us] of MuJoCo's steps for one control tick, while random velocities are commanded."""
+    """Return MuJoCo's processor time [us] for the steps of one control tick, while random velocities are commanded to the joints.
+
+    `plant`: its robot, world, tick and substeps are used.  `ticks`: number of timed ticks.
+    """
     alive = np.isin(np.arange(len(plant.robot.motors)), plant.motors.living)
     robot = stiffened(plant.robot, alive, solids=False)
     peer = MujocoPeer(replace(robot, untested=_untested(robot)), plant.model.world.objects, servo=SERVO_GAIN)

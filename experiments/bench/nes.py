@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Evolution strategies: how many evaluations ours needs beside CMA-ES on rotated functions, from the same starts."""
+"""Evolution strategies: number of evaluations that the library's NES and CMA-ES need on rotated functions, from the same starts."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ REQUIREMENTS = (Requirement("evaluations over CMA-ES's, median of rows", ("ratio
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Dimensions of the functions, and runs of each."""
+    """Settings of the benchmark.  `dimensions`: dimensions of the functions.  `runs`: runs of each strategy on each function."""
 
     dimensions: tuple[int, ...] = (10, 20, 41)
     runs: int = 11
@@ -48,7 +48,11 @@ QUICK = Settings(dimensions=(10,), runs=3)
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """Measure, and return all numbers and the verdict; raises NotInstalled without cma."""
+    """Run this benchmark and return its result; raises NotInstalled without cma.
+
+    Main keys: "rows", one for each function and dimension, with the median evaluations of each strategy and the "ratio" of NES to CMA-ES;
+    "ratio", the median of these ratios; "requirements" and "passed".
+    """
     load_cma()
     rows = [(name, d) for d in settings.dimensions for name in FUNCTIONS]
     found = []
@@ -73,10 +77,13 @@ def _row(name: str, d: int, runs: int) -> dict[str, Any]:
 
 
 def search(strategy: str, function: str, d: int, seed: int, most: int = MAX_EVALUATIONS) -> tuple[float, float]:
-    """Search for the optimum of a rotated function of `d` dimensions, from a start of this seed.
+    """Search for the minimum of a rotated function with one strategy.
 
-    Returns the number of evaluations until one costs less than TARGET, inf if `most` do not suffice, and the processor time of one
-    evaluation [us], without the function's.
+    `strategy`: a key of STRATEGIES.  `function`: a key of FUNCTIONS.  `d`: number of dimensions.  `seed`: of rotation, start and strategy.
+    `most`: maximum number of evaluations.
+
+    Returns the number of evaluations until a sample costs less than TARGET (1e-8), or inf if `most` do not suffice; and the strategy's own
+    processor time per evaluation [us], without the time of the function.
     """
     rng = np.random.default_rng((seed, d))
     rotation = np.linalg.qr(rng.standard_normal((d, d)))[0]
@@ -95,7 +102,7 @@ def search(strategy: str, function: str, d: int, seed: int, most: int = MAX_EVAL
 
 
 def report(result: dict[str, Any]) -> str:
-    """Format the measurements."""
+    """Return the result of `measure` as text: a table with one line for each function and dimension, then the requirements."""
     lines = [
         f"Evaluations until f < {result['target']:g}, start in [-1, 1], standard deviation {result['std']}, rotated,",
         f"medians of {result['runs']} runs; in brackets processor time of its own, us an evaluation:",

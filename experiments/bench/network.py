@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A system on two hosts while the network between them is disturbed: what the robot obeys, when it holds, when it is back.
+"""A system on two hosts while the network between them is disturbed: which commands the robot obeys, when parts hold and move again.
 
-Claim: no command is obeyed that answers a tick of more than 100 ms ago by robot_sim's clock; parts whose controller is beyond a cut hold,
-and a part whose agent is beyond it begins no new action; every part is back within 5 s after the network is whole; no transition is lost,
-doubled or mixed; no motor is faster than the gate allows.  The hosts are network namespaces on this machine, with keys, and the monotonic
-clock of the second host is an hour ahead.  Packets are delayed, lost and reordered by a seed.  Times are judged only if the load was low.
-Run time: 3 minutes.
+Claim: no command is obeyed that answers a tick of more than 100 ms ago by robot_sim's clock.  Parts hold if a cut separates them from their
+controller.  A part begins no new action if a cut separates it from its agent.  Every part moves again within 5 s after the network works
+again.  No transition is lost, doubled or mixed.  No motor is faster than the gate allows.
+
+The hosts are network namespaces on this machine, with keys, and the monotonic clock of the second host is an hour ahead.  Packets are
+delayed, lost and reordered at random, with a seed.  Times are judged only if the load was low.  Run time: 3 minutes.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ ENDPOINT = f"tls/{FIRST}:7447"
 HOST = "second"
 AGENTS = ("torso", "left_arm", "right_arm")
 LAYOUTS: Mapping[str, tuple[str, ...]] = {"agent": ("agent_left_arm", "monitor"), "control": ("controller", "model", "agent_left_arm")}
-"""The services of the second host."""
+"""The services that run on the second host, by the name of the layout; all others run on the first host."""
 BEYOND = "left_arm"  # the part whose agent is on the second host
 UNDER_WAY = 0.5  # s after the beginning of a cut within which a call of the agent may still arrive
 _START, _BACK, _QUIET_TIME = 120.0, 60.0, 1.0  # s
@@ -49,7 +50,11 @@ _ALL_SERVICES = ("robot_sim", "model", "controller", "monitor", "recorder", "lau
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """What is done to the network, and for how long: `faults` to its packets, or `unplugged` the second host's interface."""
+    """A disturbance of the network between the hosts.
+
+    `faults`: what happens to its packets.  `unplugged`: whether the network interface of the second host is off.  `seconds`: duration [s];
+    0: as in the settings.
+    """
 
     name: str
     faults: Faults = Faults()
@@ -58,7 +63,7 @@ class Fault:
 
     @property
     def cuts(self) -> bool:
-        """Whether nothing gets through."""
+        """Whether no packet arrives while the fault lasts."""
         return self.unplugged or self.faults.cut
 
 
@@ -75,7 +80,11 @@ FAULTS = (
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Which services are beyond the network, what happens to it and for how long [s], how often, and the seed of the packets."""
+    """Settings of the benchmark.
+
+    `layouts`: keys of LAYOUTS, which say what runs on the second host.  `faults`: names of disturbances in FAULTS.  `seconds`: duration of
+    each disturbance [s].  `rounds`: how often each is repeated.  `seed`: of the delayed, lost and reordered packets.
+    """
 
     layouts: tuple[str, ...] = tuple(LAYOUTS)
     faults: tuple[str, ...] = tuple(fault.name for fault in FAULTS)
@@ -88,7 +97,12 @@ QUICK = Settings(faults=("loss 5 %", "cut", "silent cut"), seconds=3.0)
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """Disturb the network of a system on two hosts, and return all measurements and the verdict; raises LaunchFailed."""
+    """Disturb the network of a system on two hosts and return the result; raises LaunchFailed.
+
+    Main keys: "oldest_ms", age of the oldest command that was obeyed [ms]; "back_s", longest time until all parts moved again [s];
+    "transitions", numbers of kept and lost ones; "broken", the broken guarantees as text; "rows", the measurements of each disturbance;
+    "passed".
+    """
     argv = [sys.executable, "-m", "mobee_system.run", "experiments.bench.network", msgspec.json.encode(asdict(settings)).decode()]
     done = subprocess.run(inside(argv), stdout=subprocess.PIPE, text=True)
     if done.returncode != 0:
@@ -97,7 +111,7 @@ def measure(settings: Settings) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Measure inside a network namespace, and print the result as JSON."""
+    """Measure inside a network namespace, with the settings that the command line gives as JSON, and print the result as JSON."""
     settings = msgspec.json.decode(sys.argv[1], type=Settings)
     try:
         result = _measured(settings)
@@ -313,7 +327,7 @@ def _result(settings: Settings, rows: list[dict[str, Any]], kept: dict[str, int]
 
 
 def report(result: dict[str, Any]) -> str:
-    """Format the measurements."""
+    """Return the result of `measure` as text: a table with one line for each disturbance, then the broken guarantees."""
     kept = result["transitions"]
     rows = result["rows"]
     lines = [

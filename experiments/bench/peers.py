@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Programs of other authors: how they are imported, CMA-ES, coal's searches, and solvers of decision problems."""
+"""Programs of other authors: their import, CMA-ES, settings of coal's searches, and solvers of decision problems."""
 
 from __future__ import annotations
 
@@ -16,7 +16,11 @@ from mobee.learning.value_iteration import OutcomeModel
 
 
 def import_peer(module: str, name: str, extra: str = "bench") -> Any:
-    """Import an optional package and return it; raises NotInstalled, which names the extra of MoBeE that installs it."""
+    """Import an optional module and return it.
+
+    `name`: of the package, and `extra`: the extra of MoBeE that installs it, both for the message of NotInstalled, which is raised if it is
+    missing.
+    """
     try:
         return importlib.import_module(module)
     except ImportError:
@@ -24,17 +28,27 @@ def import_peer(module: str, name: str, extra: str = "bench") -> Any:
 
 
 def load_cma() -> Any:
-    """Return the package cma, CMA-ES by its authors; raises NotInstalled."""
+    """Return the imported package cma (CMA-ES by its authors); raises NotInstalled if it is missing."""
     return import_peer("cma", "cma")
 
 
 class CmaStrategy:
-    """CMA-ES with its default rates and the methods of the library's strategies: `ask` returns a generation, `tell` takes its costs."""
+    """CMA-ES with its default settings and the interface of the library's strategies.
+
+    `ask` returns a generation of samples, and `tell` takes their costs.
+
+    Args:
+        start: mean of the first generation (d,).
+        std: standard deviation of the first generation.
+        seed: of the random numbers.
+        population: samples of a generation; None: CMA-ES chooses.
+        limits: lower and upper limit of every coordinate; None: no limits.
+    """
 
     def __init__(
         self, start: Array, std: float, seed: int, population: int | None = None, limits: tuple[float, float] | None = None
     ) -> None:
-        """`limits`: of every coordinate, None for none."""
+        """Make the strategy.  `limits`: lower and upper limit of every coordinate; None: no limits.  Raises NotInstalled without cma."""
         options: dict[str, Any] = {"seed": seed + 1, "verbose": -9, "bounds": limits or [None, None]}  # its seed 0 means the time of day
         if population is not None:
             options["popsize"] = population
@@ -42,17 +56,17 @@ class CmaStrategy:
         self._asked: list[Array] = []
 
     def ask(self) -> Array:
-        """Return the next generation, (population, d)."""
+        """Return the samples of the next generation, (population, d)."""
         self._asked = self._strategy.ask()
         return np.array(self._asked)
 
     def tell(self, costs: Array) -> None:
-        """Learn from the costs (population,) of the samples that `ask` returned."""
+        """Update the strategy by the costs (population,) of the samples that the last call of `ask` returned."""
         self._strategy.tell(self._asked, costs.tolist())
 
     @property
     def stopped(self) -> bool:
-        """Whether its own criteria say that the search has ended."""
+        """Whether a stopping criterion of CMA-ES itself is met."""
         return bool(self._strategy.stop())
 
 
@@ -62,7 +76,7 @@ _COAL_TOLERANCE, _COAL_ITERATIONS, _COAL_SEARCH = 1e-12, 1000, "NesterovAccelera
 
 
 def make_searches_precise(found: Any) -> None:
-    """Set the requests of Pinocchio's GeometryData `found` so that coal misses no contact."""
+    """Change the settings of coal in Pinocchio's GeometryData `found`, so that its iterative searches miss no contact."""
     search = import_peer("coal", "coal", extra="dev").GJKVariant.names[_COAL_SEARCH]
     for request in found.distanceRequests:
         request.enable_signed_distance = True
@@ -79,16 +93,16 @@ QUANTECON = {"value_iteration": "quantecon value iteration", "modified_policy_it
 
 
 def load_quantecon() -> Any:
-    """Return quantecon's class DiscreteDP; raises NotInstalled."""
+    """Return quantecon's class DiscreteDP; raises NotInstalled if quantecon is missing."""
     return import_peer("quantecon.markov", "quantecon").DiscreteDP
 
 
 class DecisionProblem:
     """A decision problem in the form that SciPy and quantecon need: a sparse matrix with a row for each state-action.
 
-    It is made before the timing begins.  Every state must have at least one action.  It holds the rewards (N,) and the transition
-    probabilities (N, S) of all N state-actions.  quantecon's policy iteration, which is exact, is not measured: it does not end if the
-    values of two actions differ only by rounding errors.
+    It is built before the timing begins.  Every state must have at least one action.  `rewards` (N,) and `following` (N, S) are the rewards
+    and the transition probabilities of all N state-actions. quantecon's policy iteration, which is exact, is not measured: it does not end
+    if the values of two actions differ only by rounding errors.
 
     Args:
         model, reward, discount, tolerance: as of `mobee.value_iteration`.
@@ -105,7 +119,7 @@ class DecisionProblem:
         self.following.eliminate_zeros()
 
     def scipy_values(self) -> Array:
-        """Compute state values (S,) by Algorithm 7, one sparse product per sweep."""
+        """Compute the values of the states (S,) by thesis Algorithm 7, with one product of SciPy's sparse matrix per sweep."""
         values, before = np.zeros(len(self.first)), np.zeros(len(self.rewards))
         while True:
             action_values = self.rewards + self.discount * (self.following @ values)
@@ -115,11 +129,15 @@ class DecisionProblem:
             before = action_values
 
     def quantecon(self) -> Any:
-        """Return the problem as quantecon's object."""
+        """Return the problem as an instance of quantecon's DiscreteDP."""
         return load_quantecon()(self.rewards, self.following, self.discount, self.states, self.actions)
 
     def quantecon_values(self, problem: Any, method: str) -> Array:
-        """Compute state values (S,) by quantecon from its own start, which is nearer than zero; its value iteration stops by our rule."""
+        """Compute the values of the states (S,) by quantecon.
+
+        It starts from its own initial values, which are nearer to the solution than zeros.  Its value iteration stops by the same tolerance
+        as ours.  `problem`: the result of `quantecon`.  `method`: a key of QUANTECON.
+        """
         epsilon = 2.0 * self.discount / (1.0 - self.discount) * self.tolerance
         values: Array = problem.solve(method=method, epsilon=epsilon, max_iter=100_000).v
         return values

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The offline plant: how fast it is compared with MuJoCo's stepper on the same model, and the gain of a batch of plants.
+"""The offline plant: how fast it is compared with MuJoCo's stepper on the same robot, and the gain of a batch of plants.
 
-One arm goes to random states of its lattice, one arm reaches, and three curious agents act at the table, as in the published experiments.
+One arm moves to random states of its lattice, one arm reaches, and three curious agents act at the table, as in the published experiments.
 """
 
 from __future__ import annotations
@@ -44,7 +44,11 @@ REQUIREMENTS = (
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Settings: sizes and repetitions of the runs."""
+    """Sizes and repetitions of the runs.
+
+    `actions`, `reaches` and `transitions`: of one run of each kind.  `hashed`: actions of the trajectory whose hash is computed twice.
+    `ticks`: of MuJoCo.  `batched`: actions of each plant of a batch.  `rounds`: repetitions; the median counts.
+    """
 
     actions: int = 1000
     reaches: int = 500
@@ -59,7 +63,11 @@ QUICK = Settings(actions=100, reaches=50, transitions=300, hashed=10, ticks=500,
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """Measure, and return all numbers and the verdict; raises NotInstalled without MuJoCo."""
+    """Run this benchmark and return its result; raises NotInstalled without MuJoCo.
+
+    Main keys: "one_arm", "reaching" and "three_agents", medians of the rates (`Pace`); "mujoco_us_per_tick" and "times_mujoco" (MuJoCo's
+    time over ours); "batch", the result of `measure_batch`; "requirements", "same_hash" and "passed".
+    """
     load_mujoco()
     runs: dict[str, Callable[[], Pace]] = {
         "one_arm": lambda: one_arm(arm_plant(), settings.actions),
@@ -86,7 +94,7 @@ def measure(settings: Settings) -> dict[str, Any]:
 
 
 def report(result: dict[str, Any]) -> str:
-    """Format the measurements."""
+    """Return the result of `measure` as text: a table with one line for each kind of run, then the requirements."""
     lines = [
         f"Ticks of {1e3 * result['tick']:g} ms, motor substeps of 5 ms; processor time",
         f"{cores_text(result['core'])}, rounds: {result['rounds']} (the median counts).",
@@ -107,7 +115,11 @@ def report(result: dict[str, Any]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Pace:
-    """Times and rates of one run."""
+    """Times and counts of one run.
+
+    `seconds`: processor time of this process [s].  `plant_seconds`: simulated time of all plants [s].  `ticks`: of all plants.  `ended`:
+    actions, reaches or transitions that ended.  `wall_seconds`: [s].
+    """
 
     seconds: float  # processor time of this process
     plant_seconds: float  # of all plants
@@ -117,7 +129,7 @@ class Pace:
 
     @property
     def numbers(self) -> dict[str, float]:
-        """The rates as the JSON has them."""
+        """The rates of the run, by their names in the JSON result; they are computed from the processor time."""
         return {
             "times_real_time": self.plant_seconds / self.seconds,
             "actions_per_second": self.ended / self.seconds,
@@ -126,12 +138,16 @@ class Pace:
         }
 
     def standard(self, speed: float) -> dict[str, float]:
-        """Return the rates on the standard machine, if this machine had that speed (calibration.py)."""
+        """Return two of the rates as they are on the standard machine.
+
+        `speed`: the speed of this machine during the run, in multiples of the standard machine's (calibration.py).  Keys:
+        "standard_times_real_time" and "standard_actions_per_second".
+        """
         return {f"standard_{key}": self.numbers[key] / speed for key in ("times_real_time", "actions_per_second")}
 
 
 class Stopwatch:
-    """Sums the processor time and the wall time of the work with plants, while it runs."""
+    """Sums the processor time, the wall time and the simulated time of plants over all contexts of `running`."""
 
     def __init__(self, *plants: OfflinePlant) -> None:
         self._plants = plants
@@ -139,7 +155,7 @@ class Stopwatch:
 
     @contextmanager
     def running(self) -> Iterator[None]:
-        """Measure the work in this context."""
+        """Measure the work that is done inside this context manager."""
         begin, wall, start = self._plant_time(), time.perf_counter(), time.process_time()
         yield
         self._seconds += time.process_time() - start
@@ -147,7 +163,7 @@ class Stopwatch:
         self._plant_seconds += self._plant_time() - begin
 
     def pace(self, ended: int) -> Pace:
-        """Return the pace of so many actions or transitions."""
+        """Return the times and rates measured so far.  `ended`: number of actions, reaches or transitions in the measured time."""
         return Pace(self._seconds, self._plant_seconds, round(self._plant_seconds / self._plants[0].dt), ended, self._wall)
 
     def _plant_time(self) -> float:
@@ -155,17 +171,20 @@ class Stopwatch:
 
 
 def robot() -> Robot:
-    """Return the published model."""
+    """Return the robot of the published experiments, "icub_2014"."""
     return mobee.load_robot("icub_2014")
 
 
 def arm_plant(dt: float = DT, world: World | None = None, hashed: bool = False) -> OfflinePlant:
-    """Return a plant of the left arm's four motors, the other motors rigid; published gains and motors, self-collision."""
+    """Return an offline plant in which only the four motors of the left arm move, with the published gains and self-collision.
+
+    `dt`: control tick [s].  `world`: None: an empty one.  `hashed`: whether the plant computes a hash of its trajectory.
+    """
     return OfflinePlant(Model(robot(), world), SEED, Gains.published_2014(), dt=dt, active=LEFT, hashed=hashed)
 
 
 def one_arm(plant: OfflinePlant, actions: int) -> Pace:
-    """Measure actions to random goals of the lattice."""
+    """Measure `actions` actions of the left arm to random states of its lattice (256 states)."""
     space = Lattice(plant.robot, LEFT, LEVELS)
     goals = [space.target(int(state)) for state in np.random.default_rng(SEED).integers(len(space), size=actions + WARM_UP)]
     for goal in goals[:WARM_UP]:
@@ -178,7 +197,10 @@ def one_arm(plant: OfflinePlant, actions: int) -> Pace:
 
 
 def one_arm_reaching(plant: OfflinePlant, reaches: int) -> Pace:
-    """Measure reaches from random states of the lattice to random targets in front of the arm; the moves between them do not count."""
+    """Measure reaches of the left palm from random states of the lattice to random targets in front of the arm.
+
+    The actions that move the arm to a start are not counted.
+    """
     space, rng = Lattice(plant.robot, LEFT, LEVELS), np.random.default_rng(SEED)
     warm_up, watch = Stopwatch(plant), Stopwatch(plant)
     for number in range(reaches + WARM_UP):
@@ -190,7 +212,10 @@ def one_arm_reaching(plant: OfflinePlant, reaches: int) -> Pace:
 
 
 def three_agents(transitions: int) -> Pace:
-    """Measure transitions of curious agents at the table, without a store: torso, 27 states with 8 neighbours, and arms, 81 with 16."""
+    """Measure transitions of three curious agents at the table, without a file of transitions.
+
+    The agents are those of the torso, 27 states with 8 neighbours, and of both arms, 81 states with 16 neighbours each.
+    """
     plant = OfflinePlant(Model(robot(), mobee.load_world("table")), SEED, Gains.published_2014(), dt=DT, active=(*TORSO, *LEFT, *RIGHT))
     spaces = [Lattice(plant.robot, motors, neighbours=count) for motors, count in ((TORSO, 8), (LEFT, 16), (RIGHT, 16))]
     agents = [mobee.CuriousAgent(space, plant, seed=SEED) for space in spaces]
@@ -202,25 +227,28 @@ def three_agents(transitions: int) -> Pace:
 
 
 def trajectory_hash(actions: int) -> str:
-    """Return the hash of a new plant's trajectory."""
+    """Return the hash of the trajectory that a new plant makes in `one_arm` with this number of actions; equal runs have equal hashes."""
     plant = arm_plant(hashed=True)
     one_arm(plant, actions)
     return plant.hash
 
 
 class Batch:
-    """Plants of one robot, one arm each, that go to random goals of the lattice; each has a world of its own, as learners have."""
+    """Several plants of one robot, each with one arm that moves to random states of the lattice, and each with a world of its own.
+
+    `count`: number of plants.
+    """
 
     def __init__(self, body: Robot, count: int = PLANTS) -> None:
         self.plants = [OfflinePlant(Model(body), SEED + k, Gains.published_2014(), dt=DT, active=LEFT) for k in range(count)]
         self._space, self._rng = Lattice(body, LEFT, LEVELS), np.random.default_rng(SEED)
 
     def alone(self, actions: int) -> Pace:
-        """Make that many actions with each plant, one action after the other."""
+        """Measure `actions` actions of each plant, where the plants act one after the other."""
         return self._timed(actions, lambda goals: [plant.act("left_arm", goal) for plant, goal in zip(self.plants, goals, strict=True)])
 
     def together(self, actions: int, threads: int = 1) -> Pace:
-        """Make that many actions with each plant, all plants at once."""
+        """Measure `actions` actions of each plant, where all plants advance together in one batch.  `threads`: threads of the batch."""
         return self._timed(actions, lambda goals: self._advance(goals, threads))
 
     def _advance(self, goals: Sequence[Any], threads: int) -> None:
@@ -239,9 +267,13 @@ class Batch:
 
 
 def measure_batch(actions: int, rounds: int) -> dict[str, Any]:
-    """Compare a batch with one plant alone, and two threads with one; medians of the rounds.
+    """Compare a batch of plants with one plant alone, and two threads with one thread, in the same rounds.
 
-    `actions`: of each plant of the batch in a round.  All take turns in a round.
+    `actions`: of each plant of the batch in a round; the plant alone makes as many as the whole batch.
+
+    Keys: "plants", their number; "alone" and "together", each with "us_per_tick" and "ticks_per_second"; "ratio", ticks per second of the
+    batch over the plant alone; "two_threads", ticks per second of wall time on two threads over one, or None on one core.  All are medians
+    of the rounds.
     """
     body = robot()
     one, many, shared = Batch(body, 1), Batch(body), Batch(body)
@@ -270,7 +302,7 @@ def _tick_rates(pace: Pace) -> dict[str, float]:
 
 
 def batch_text(result: dict[str, Any]) -> str:
-    """Format the comparison of a batch with one plant alone."""
+    """Return the result of `measure_batch` as text."""
     alone, together = (result[name]["us_per_tick"] for name in ("alone", "together"))
     threads = "not measured on one core" if result["two_threads"] is None else f"{result['two_threads']:.2f} x the ticks a second"
     return (

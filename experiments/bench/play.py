@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The stopwatch of `mobee play`: from the command to the first curious action that a browser shows, with an empty home folder.
 
-Claim: a robot is curious on the page at most 20 s after the command, 5 s of which are learning offline.
-Each start is a command of its own, with an empty home and an empty working directory, and headless Chromium opens the page as soon as its
-address is printed.  The 3D view is not loaded: without a graphics card the browser would draw it on the processor.  The time
-besides the learning is judged in time of the standard machine, by the calibration loop in two processes at once.  At the end the system is
-stopped as by Ctrl-C.  Run time: 25 s per robot.
+Claim: a robot is curious on the page at most 20 s after the command, 5 s of which are learning offline.  Each start is a command of its
+own, with an empty home and an empty working directory, and headless Chromium opens the page as soon as its address is printed.  The 3D view
+is not loaded: without a graphics card the browser would draw it on the processor.  The time besides the learning is judged in time of the
+standard machine, by the calibration loop in two processes at once.  At the end the system is stopped as by Ctrl-C.  Run time: 25 s per
+robot.
 """
 
 from __future__ import annotations
@@ -47,7 +47,11 @@ SHOWN = "first action on the page"
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Settings: the robots, as for `mobee play`; the interpreter whose MoBeE is measured, by default this one; starts of each robot."""
+    """Settings of the benchmark.
+
+    `robots`: names or files of robots, as for `mobee play`.  `python`: the interpreter whose MoBeE is measured, by default this one.
+    `rounds`: starts of each robot.
+    """
 
     robots: Sequence[str] = field(default=("icub",))
     python: str = sys.executable
@@ -58,7 +62,11 @@ QUICK = Settings(rounds=1)
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """Measure, and return all numbers and the verdict; raises NotInstalled and LaunchFailed."""
+    """Run this benchmark and return its result; raises NotInstalled without Chromium or Playwright, and LaunchFailed.
+
+    Main keys: "starts", the measurements of each start; "slowest_standard_s", time of the slowest robot on the standard machine [s];
+    "ends_clean", whether every system ended without error and left no process; "requirements" and "passed".
+    """
     chromium = find_chromium()
     if chromium is None:
         raise NotInstalled("Chromium is not installed: apt-get install chromium")
@@ -151,7 +159,7 @@ def _median(starts: Sequence[dict[str, Any]], robot: str) -> dict[str, Any]:
 
 
 def report(result: dict[str, Any]) -> str:
-    """Format the measurements."""
+    """Return the result of `measure` as text: for each robot the times of the steps of its median start, then the requirements."""
     robots = list(dict.fromkeys(start["robot"] for start in result["starts"]))
     lines = [f"{result['python']}; seconds after the command, of the start with the median time:"]
     for robot in robots:

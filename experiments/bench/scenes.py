@@ -2,8 +2,9 @@
 """Robots, worlds and poses that benchmarks measure: an iCub-like upper body among boxes, and random robots of other makers.
 
 The upper body and its boxes are in data/bench_model.json.  The robots of other makers have the collision volumes that a URDF usually has.
-Each is a trunk of three joints with two arms of seven and a neck of two on it, and two legs of six at the base: 31 motors, a joint
-each, and two volumes per link.  Links that are mounted on each other or on the same one are not tested, as in most SRDFs.
+Each is a trunk of three joints with two arms of seven and a neck of two on it, and two legs of six at the base: 31 motors, a joint each,
+and two volumes per link.  Two links are not tested against each other if one is mounted on the other, if both are mounted on the same link,
+or if a single link is between them, as in most SRDFs.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ _VOLUME_SCALE = 1.6  # of the robot's volumes, in sizes of the objects around it
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """A robot in a world, and poses (B, n)."""
+    """A robot in a world, and poses `q` (B, n) rad of its motors."""
 
     name: str
     robot: Robot
@@ -49,10 +50,10 @@ class Scene:
 def upper_body(role: Literal["field", "solid"] = "field", primitives: int | None = None) -> Robot:
     """Return the benchmark's upper body of 41 motors, which is like the iCub's.
 
-    Pairs of a shape of the base and a world object are not tested, because neither moves.
+    Pairs of a shape of the base and a world object are not tested, because neither the base nor the world moves.
 
     Args:
-        role: "field": the shapes cause forces; "solid": they do not.
+        role: "field": the shapes cause repulsive forces; "solid": they do not.
         primitives: number of shapes, the first ones; None: all 129.
     """
     data = _file_content()
@@ -79,7 +80,7 @@ def upper_body(role: Literal["field", "solid"] = "field", primitives: int | None
 
 
 def boxes_world(boxes: int) -> World:
-    """Return a world of the first `boxes` (0 to 1000) random boxes; a smaller world is the beginning of a larger one."""
+    """Return a world with the first `boxes` (0 to 1000) of a fixed list of random boxes."""
     made = World()
     for index, entry in enumerate(_file_content()["boxes"][:boxes]):
         turn = np.array(entry["R"]).reshape(3, 3)
@@ -88,30 +89,33 @@ def boxes_world(boxes: int) -> World:
 
 
 def upper_body_poses(count: int, seed: int = POSE_SEED) -> Array:
-    """Return random q (count, 41) rad, uniform between the limits."""
+    """Return random poses (count, 41) rad of the upper body, uniform between the motors' limits."""
     low, high = upper_body().limits.T
     return np.random.default_rng(seed).uniform(low, high, (count, len(low)))
 
 
 def upper_body_scene(boxes: int, poses: int) -> Scene:
-    """Return the upper body among boxes, in random poses."""
+    """Return the upper body in random poses among boxes.  `boxes`: number of boxes, 0 to 1000.  `poses`: number of poses."""
     return Scene(ICUB, upper_body(), boxes_world(boxes), upper_body_poses(poses))
 
 
 @dataclass(frozen=True, slots=True)
 class Maker:
-    """The kinds of volumes of a robot, equally many of each, and the kinds of objects around it."""
+    """A kind of random robot that stands for robots of other makers, and its world.
+
+    `kinds`: kinds of the robot's collision volumes, equally many of each.  `around`: kinds of the objects around it.
+    """
 
     name: str
     kinds: tuple[ShapeKind, ...]
     around: tuple[ShapeKind, ...]
 
     def robot(self, seed: int = MAKER_SEED) -> Robot:
-        """Return the robot; all its volumes are fields, so that they make forces."""
+        """Return the random robot with 31 motors.  All its volumes are fields, so that they cause repulsive forces."""
         return _random_robot(self, seed)
 
     def world(self, objects: int, seed: int = MAKER_SEED) -> World:
-        """Return a world of the first `objects` random objects; a smaller world is the beginning of a larger one."""
+        """Return a world with `objects` random objects.  With equal seeds, a smaller world has the first objects of a larger one."""
         rng, made = np.random.default_rng([seed, 1]), World()
         for index in range(objects):
             shape = _random_geometry(rng, self.around[index % len(self.around)])
@@ -120,12 +124,12 @@ class Maker:
         return made
 
     def poses(self, count: int, seed: int = MAKER_SEED) -> Array:
-        """Return random q (count, 31) rad, uniform between the limits."""
+        """Return random poses (count, 31) rad of the robot, uniform between the motors' limits."""
         low, high = self.robot().limits.T
         return np.random.default_rng([seed, 2]).uniform(low, high, (count, len(low)))
 
     def scene(self, objects: int, poses: int) -> Scene:
-        """Return the robot among objects, in random poses."""
+        """Return the robot in random poses among objects.  `objects`: number of objects.  `poses`: number of poses."""
         return Scene(self.name, self.robot(), self.world(objects), self.poses(poses))
 
 

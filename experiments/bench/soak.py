@@ -3,7 +3,7 @@
 
 Claim: after a warm-up of a tenth of the time no process is started again, the memory of each grows by less than 5 MB, open files and
 threads stay the same, and the last tenth of the ticks takes at most 1.2 times as long as the first one after the warm-up.  The ages of the
-commands that the motors obey have the same distribution in both: the shares up to each age differ by at most .05.  Three agents learn on
+commands that the motors obey have the same distribution in both: their distribution functions differ by at most .05.  Three agents learn on
 the motor model, in lockstep, where a robot hour takes minutes and a command always answers the tick before; or live, with --scenario, in
 real time.  The recorder runs.
 """
@@ -41,7 +41,7 @@ _NUMBERS = ("memory_mb", "files", "threads")
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """The robot's time in hours, and a scenario without monitor: in lockstep, or live."""
+    """Settings of the benchmark.  `hours`: simulated time of the robot [h].  `scenario`: name of a scenario, run without monitor."""
 
     hours: float = 8.0
     scenario: str = "lockstep"
@@ -80,7 +80,12 @@ class _Sample:
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """Run the system, read the status of its processes regularly, and return the verdict; raises LaunchFailed."""
+    """Run the system, read the status of its processes regularly, and return the result; raises LaunchFailed.
+
+    Main keys: "processes", by process the growth of memory [MB], open files and threads; "slower", time of a tick at the end over that at
+    the beginning; "ages" and "apart", ages of commands [ticks] and the difference of their distributions; "restarted", processes that were
+    started again; "passed".
+    """
     ticks, end, samples = _Ticks(), settings.hours * 3600.0, list[_Sample]()
     with Progress() as progress, tempfile.TemporaryDirectory() as scratch, running(Path(scratch), settings.scenario) as system:
         with open_client(system.endpoint) as session:
@@ -167,7 +172,7 @@ def _process(hours: Any, stats: list[Stat]) -> dict[str, float]:
 
 
 def report(result: dict[str, Any]) -> str:
-    """Format the measurements."""
+    """Return the result of `measure` as text: a table with one line for each process, then ages and speed."""
     lines = [f"{result['robot_hours']:.2f} robot hours in {result['seconds'] / 60.0:.1f} minutes; load {result['load']:.1f}"]
     lines.append(f"{'process':<18}{'memory MB':>10}{'grown':>8}{'MB per hour':>18}{'files':>8}{'threads':>9}")
     for who, one in result["processes"].items():

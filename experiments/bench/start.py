@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Start-up: import, first pose and start of the whole system, in time and memory.
 
-Claim: `import mobee` takes at most 0.2 s, and the first pose with its contacts at most 0.3 s from the start of Python; the default
-system without its page is ready within 3 s and takes at most 500 MB (PSS: memory that processes share counts once).
-Processor times of the library are judged as multiples of NumPy's import, each in a fresh process, by turns; the system's time by the
+Claim: `import mobee` takes at most 0.2 s, and the first pose with its contacts at most 0.3 s from the start of Python; the default system
+without its page is ready within 3 s and takes at most 500 MB (PSS: memory that processes share counts once).  The processor times of the
+library are judged as multiples of the time to import NumPy, each in a fresh process, by turns.  The time of the system is judged by the
 calibration loop in two processes at once.  Memory is judged in MB.  Run time: half a minute.
 """
 
@@ -46,7 +46,10 @@ _TIMED = (
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Settings: numbers of imports of the library and of starts of the system, and the duration of its run [s]."""
+    """Settings of the benchmark.
+
+    `rounds`: number of imports of the library.  `systems`: number of starts of the system.  `seconds`: duration of each of its runs [s].
+    """
 
     rounds: int = 15
     systems: int = 3
@@ -57,7 +60,7 @@ QUICK = Settings(rounds=5, systems=1)
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """Measure, and return all numbers and the verdict; raises LaunchFailed."""
+    """Run this benchmark and return the result of `summarized`; raises LaunchFailed."""
     rounds: list[dict[str, tuple[float, float]]] = []
     systems: list[dict[str, Any]] = []
     with Progress() as progress:
@@ -73,9 +76,12 @@ def measure(settings: Settings) -> dict[str, Any]:
 
 
 def summarized(rounds: list[dict[str, tuple[float, float]]], systems: list[dict[str, Any]]) -> dict[str, Any]:
-    """Return medians and the verdict.
+    """Return the medians of all measurements and the verdict.
 
-    `rounds`: wall and processor time [s] of each program in each round; `systems`: the starts of the system.
+    `rounds`: wall and processor time [s] of each program, for each round.  `systems`: the measurements of each start of the system.
+
+    Keys: "wall_s" and "processor_s", by program; "times_numpy", processor time over that of importing NumPy; "system", times until it is
+    ready [s] and memory [MB]; "requirements" and "passed".
     """
     wall, own = ({name: np.array([one[name][which] for one in rounds]) for name in _PROGRAMS} for which in (0, 1))
     ratios = {name: float(np.median(own[name] / own[NUMPY])) for name in (IMPORT, POSE)}
@@ -117,7 +123,10 @@ def _system(seconds: float, speeds: Calibration) -> dict[str, Any]:
 
 
 def megabytes(launcher: int) -> dict[str, float]:
-    """Return PSS [MB] of the launcher and of every service that it has started."""
+    """Return the memory [MB] of a launcher and of the services it has started, by name.
+
+    `launcher`: process id.  The memory is the PSS: memory that n processes share counts 1/n for each.  A process that has ended is absent.
+    """
     found = {}
     for pid in (launcher, *_children(launcher)):
         with contextlib.suppress(OSError, StopIteration):  # the process has ended meanwhile
@@ -144,7 +153,7 @@ def _service_name(words: list[str]) -> str:
 
 
 def report(result: Mapping[str, Any]) -> str:
-    """Format the measurements."""
+    """Return the result of `measure` as text: a table of times, the memory of the system, then the requirements."""
     lines = [f"{'fresh processes, medians':<30}{'wall, s':>9}{'processor, s':>14}{'x numpy':>9}"]
     for name, wall in result["wall_s"].items():
         times = f"{result['times_numpy'][name]:.2f}" if name in result["times_numpy"] else ""

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The emergency stop under floods: time until robot_sim reports `estop`, by the record and by the bus, and until a client is connected.
 
-Claim: under each flood of `experiments.kit.live.floods`, and with a thousand idle connections, the stop is obeyed within 50 ms in 99 of
-100 cases, and no process ends.  The robot moves by the motor model at 100 Hz, with its three agents; each stop is sent by a new client.
-On robot_sim's machine, `mobee estop` and the page write the record of stops first: this time begins before it is written.  From other
-machines a stop has only the bus: this time begins when the client is connected.  Both end with the first state of the head in `estop`, by
-robot_sim's own clock, which is at most a tick later.  Run time: about a minute for each flood.
+Claim: under each flood of `experiments.kit.live.floods`, and with a thousand idle connections, the stop is obeyed within 50 ms in 99 of 100
+cases, and no process ends.  The robot moves by the motor model at 100 Hz, with its three agents; each stop is sent by a new client.  On the
+machine of robot_sim, `mobee estop` and the page write the stop into the record of stops: this time begins before it is written.  From other
+machines a stop can come only by the bus: this time begins when the client is connected.  Both times end with the first state of the head in
+`estop`, by robot_sim's own clock, which is at most a tick later.  Run time: about a minute for each flood.
 """
 
 from __future__ import annotations
@@ -47,7 +47,10 @@ _ARMED = 3.0  # s after a release in which the robot should move again
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """The floods, and the number of stops under each, by the record and by the bus."""
+    """Settings of the benchmark.
+
+    `floods`: names of the floods; "nothing" for none.  `stops`: number of stops under each flood, by the record, and again by the bus.
+    """
 
     floods: Sequence[str] = (NOTHING, *FLOODS)
     stops: int = 20
@@ -70,7 +73,11 @@ class _Gate:
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """Stop the robot under each flood, and return all times and the verdict; raises LaunchFailed."""
+    """Stop the robot under each flood and return the result; raises LaunchFailed.
+
+    Main keys: "floods", for each one medians and 99th percentiles [ms] of the times by the record ("stop_ms"), by the bus ("bus_stop_ms")
+    and to connect; "late" and "late_by_bus", the floods with a 99th percentile above 50 ms; "passed".
+    """
     rows = []
     with Progress() as progress, tempfile.TemporaryDirectory() as scratch, running(Path(scratch), "kinematic") as system:
         for done, name in enumerate(settings.floods):
@@ -161,7 +168,7 @@ def _processes(session: Any) -> dict[str, int]:
 
 
 def report(result: dict[str, Any]) -> str:
-    """Format the measurements."""
+    """Return the result of `measure` as text: a table with one line for each flood."""
     lines = [
         f"From a stop to estop in ms, {result['stops']} stops by record and bus under each flood",
         f"at most {result['at_most_ms']:g} (p99); load of the machine {result['load']:.1f}",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Timing for benchmarks: on chosen cores, with the competitors in turns, in processor time."""
+"""Timing for benchmarks: on chosen cores, in processor time, with the contestants in turns."""
 
 from __future__ import annotations
 
@@ -21,14 +21,17 @@ T = TypeVar("T")
 
 @contextlib.contextmanager
 def one_core() -> Iterator[int | None]:
-    """Keep every thread of this process on one core; yields its number, or None where the system cannot do that."""
+    """Keep every thread of this process on one core in this context; yields its number, or None if the system cannot do that."""
     with some_cores(1) as cores:
         yield cores[0] if cores else None
 
 
 @contextlib.contextmanager
 def some_cores(count: int) -> Iterator[tuple[int, ...]]:
-    """Keep every thread of this process on `count` cores; yields their numbers, or () where the system cannot do that."""
+    """Keep every thread of this process on at most `count` cores in this context.
+
+    Yields the numbers of the cores, or () if the operating system cannot do that.
+    """
     if not hasattr(os, "sched_setaffinity"):
         yield ()
         return
@@ -48,34 +51,34 @@ def _pin_threads(cores: set[int]) -> None:
 
 
 def cores_text(core: int | None) -> str:
-    """Return where processor time was measured, as text for reports."""
+    """Return a text for reports that says whether processor time was measured on one core.  `core`: its number, or None."""
     return "of one core" if core is not None else "(not pinned to a core)"
 
 
 def processor_time(run: Callable[[], T]) -> tuple[T, float]:
-    """Return the result of `run` and its processor time [s]."""
+    """Call `run`.  Returns its result and the processor time of this process meanwhile [s]."""
     start = time.process_time()
     result = run()
     return result, time.process_time() - start
 
 
 def medians(rounds: Sequence[Mapping[str, float]]) -> dict[str, float]:
-    """Return the median of each number over the rounds."""
+    """Return the median over the rounds of each number, by its key.  `rounds`: the numbers of each round, all with the same keys."""
     return {key: float(np.median([one[key] for one in rounds])) for key in rounds[0]}
 
 
 @dataclass(frozen=True, slots=True)
 class Contestant:
-    """One of the programs that are compared: `run` does `count` units of work (poses, plans)."""
+    """One of the programs that are compared: a call of `run` does `count` units of work (poses, plans)."""
 
     run: Callable[[], object]
     count: int
 
 
 def rates(contestants: Mapping[str, Contestant], rounds: int) -> dict[str, Array]:
-    """Return units of work per second of processor time for each contestant, (rounds,).
+    """Return the units of work per second of processor time in each round, shape (rounds,), by the name of the contestant.
 
-    In each round all contestants run once, one after the other.  The order rotates: the next contestant begins the next round.
+    Each contestant runs once without timing, then once per round.  The order rotates: each round begins with the next contestant.
     """
     names = list(contestants)
     measured: dict[str, list[float]] = {name: [] for name in names}

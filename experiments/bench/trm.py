@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The pre-grasp map of thesis figure 4.8 by least squares and by the evolution strategy: how fast, how complete, how valid."""
+"""The pre-grasp roadmap of thesis figure 4.8 by least squares and by the evolution strategy: how fast, how complete, how valid."""
 
 from __future__ import annotations
 
@@ -44,7 +44,11 @@ REQUIREMENTS = tuple(
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """The spacing [m], the seeds of each method, the least number of vertices, and the methods."""
+    """Settings of the benchmark.
+
+    `spacing`: distance between vertices of the roadmap [m].  `seeds`: number of roadmaps that each method builds.  `vertices`: required
+    number of vertices.  `methods`: names of the methods ("least_squares", "nes", "hybrid").
+    """
 
     spacing: float = PREGRASP_SPACING
     seeds: int = 1
@@ -56,7 +60,11 @@ QUICK = Settings(spacing=0.03, vertices=300)
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """Measure, and return all numbers and the verdict; of several seeds the worst."""
+    """Run this benchmark and return its result.
+
+    Main keys: "rows", by method: times, number of vertices, coverage and validity, each the worst of all seeds; "reachable", the number of
+    reachable points to compare with; "requirements" and "passed".
+    """
     example = replace(pregrasp(), margin=0.0)  # all that can be reached
     spacing = np.full(len(example.task.names), settings.spacing)
     rows: dict[str, dict[str, float]] = {}
@@ -117,7 +125,7 @@ def _quality(example: Example, trm: Roadmap, points: Array, spacing: Array) -> d
 
 
 def report(result: dict[str, Any]) -> str:
-    """Format the measurements."""
+    """Return the result of `measure` as text: a table with one line for each method, then the requirements."""
     lines = [
         f"Right palm down over the table (thesis figure 4.8), {1e3 * result['spacing']:g} mm apart,",
         f"on {len(result['cores']) or 'all'} cores; {result['reachable']} reachable places to compare with:",

@@ -13,7 +13,11 @@ from typing import Any
 
 @dataclass(frozen=True, slots=True)
 class Requirement:
-    """A bound on one number of a benchmark's result; `aim`, a better value, is printed and decides nothing."""
+    """A bound on one number of a benchmark's result.
+
+    `name`: text for the report.  `keys`: where the number is in the result, from the outermost key.  `at_least` and `at_most`: bounds;
+    None: no bound.  `aim`: a better value, which is printed but does not change the verdict.
+    """
 
     name: str
     keys: tuple[str | int, ...]  # of the result, from the outermost
@@ -22,14 +26,17 @@ class Requirement:
     aim: float | None = None
 
     def judge(self, result: Mapping[str, Any]) -> dict[str, Any]:
-        """Return name, number, bounds and verdict, as JSON has them; NaN never passes.  Raises KeyError if it was not measured."""
+        """Return whether a result meets this requirement.  Raises KeyError if the number was not measured.
+
+        Keys: "name", "found" (the number), its bounds, "aim" and "passed"; bounds that are None are absent.  NaN does not pass.
+        """
         found = self._number_in(result)
         passed = (self.at_least is None or found >= self.at_least) and (self.at_most is None or found <= self.at_most)
         bounds = {"at_least": self.at_least, "at_most": self.at_most, "aim": self.aim}
         return {"name": self.name, "found": found, **{key: at for key, at in bounds.items() if at is not None}, "passed": passed}
 
     def is_measured(self, result: Mapping[str, Any]) -> bool:
-        """Whether the result has the number."""
+        """Whether the result contains the number to which this requirement applies."""
         try:
             self._number_in(result)
         except KeyError:
@@ -44,13 +51,17 @@ class Requirement:
 
 
 def verdict(result: Mapping[str, Any], requirements: Iterable[Requirement], **conditions: bool) -> dict[str, Any]:
-    """Return the part of a result that says whether it passes: every requirement is met and every named condition holds."""
+    """Return the verdict on a result, to be merged into the result.
+
+    Keys: "requirements", as of `Requirement.judge`; the named `conditions`; "passed": whether all requirements are met and all conditions
+    are true.
+    """
     judged = [one.judge(result) for one in requirements]
     return {"requirements": judged, **conditions, "passed": all(one["passed"] for one in judged) and all(conditions.values())}
 
 
 def requirement_lines(requirements: Iterable[Mapping[str, Any]]) -> list[str]:
-    """Return a line of at most 80 columns for each requirement; it ends with the verdict."""
+    """Return a line of text for each judged requirement, of at most 80 columns, that ends with the verdict ("pass" or "SHORT")."""
     return [
         f"  {one['name']:<44}{_number(one['found']):>9} {_bound(one):>8} {_aim(one):<9} {'pass' if one['passed'] else 'SHORT'}"
         for one in requirements
@@ -58,7 +69,11 @@ def requirement_lines(requirements: Iterable[Mapping[str, Any]]) -> list[str]:
 
 
 def report_text(lines: Iterable[str], result: Mapping[str, Any], speed: float | None = None) -> str:
-    """Return the lines of a benchmark, then the speed of this machine if it was measured, then the requirements."""
+    """Return the text of a benchmark's report.
+
+    It has `lines`, then the speed of this machine if it was measured (in `result` or as `speed`, in multiples of the standard machine's),
+    then the requirements in `result`.
+    """
     speed = result.get("speed", speed)
     calibration = [] if speed is None else [f"Calibration: {speed:.2f} x the standard machine's speed.  Required, in its time:"]
     return "\n".join([*lines, *calibration, *requirement_lines(result["requirements"])])

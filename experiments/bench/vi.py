@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Planning: how exact and how fast plans are, beside exact policy iteration, SciPy's sparse matrices and quantecon."""
+"""Planning: how exact and how fast value iteration is, beside exact policy iteration, SciPy's sparse matrices and quantecon."""
 
 from __future__ import annotations
 
@@ -42,7 +42,12 @@ REQUIREMENTS = (
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Settings: the number of problems, and of repetitions."""
+    """Settings of the benchmark.
+
+    `problems`: number of random problems.  `rounds`: repetitions of the timing.  `observations`: number of observations of the agent; a
+    warm plan, which starts from the values of the plan before, is timed after each.  `large`: number of states of the large problem.
+    `large_rounds`: repetitions with it.
+    """
 
     problems: int = 1000
     rounds: int = 15
@@ -55,7 +60,11 @@ QUICK = Settings(problems=50, rounds=3, observations=50, large_rounds=1)
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """Measure, and return all numbers and the verdict; raises NotInstalled without quantecon."""
+    """Run this benchmark and return its result; raises NotInstalled without quantecon.
+
+    Main keys: "us", median time of a plan by solver [us]; "cold_times_scipy" and the like, time of a peer over ours; "difference", largest
+    relative difference from policy iteration; "residual", largest Bellman residual in units of the tolerance; "requirements" and "passed".
+    """
     load_quantecon()
     with one_core() as core, Progress() as progress:
         errors = []
@@ -80,7 +89,7 @@ def measure(settings: Settings) -> dict[str, Any]:
 
 
 def report(result: dict[str, Any]) -> str:
-    """Format the measurements."""
+    """Return the result of `measure` as text: the times of all solvers, then the requirements."""
     lines = [
         f"81 states, 16 actions, discount {DISCOUNT}, tolerance {TOLERANCE}; processor time",
         f"{cores_text(result['core'])}, medians of {result['rounds']} rounds, in us a plan:",
@@ -93,7 +102,7 @@ def report(result: dict[str, Any]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """Outcomes and probabilities (B,) of one state-action, and its reward."""
+    """The outcomes of one state-action, their probabilities, both (B,) for B bins, and its reward."""
 
     state: int
     action: int
@@ -104,38 +113,45 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Tables:
-    """Outcomes and probabilities, shape (S, A, B), and a reward (S, A)."""
+    """The tables of a decision problem with S states, A actions and B bins of outcomes.
+
+    `outcomes` (S, A, B): the next states; `probabilities` (S, A, B); `reward` (S, A).
+    """
 
     outcomes: Ints
     probabilities: Array
     reward: Array
 
     def row(self, state: int, action: int) -> Row:
-        """Return a copy of a row, so that it can be put back."""
+        """Return a copy of the entries of one state-action, which `put` can restore later."""
         at = state, action
         return Row(state, action, self.outcomes[at].copy(), self.probabilities[at].copy(), float(self.reward[at]))
 
     def put(self, row: Row) -> None:
-        """Change one row in place, as an observation does."""
+        """Replace the entries of one state-action in place, as a new observation does."""
         at = row.state, row.action
         self.outcomes[at], self.probabilities[at], self.reward[at] = row.outcomes, row.probabilities, row.reward
 
 
 @dataclass(frozen=True, slots=True)
 class ChangingProblem:
-    """A problem and changes of one row each: the changes by some observations, then their reversals in reverse order."""
+    """A decision problem and a sequence of changes of one state-action each.
+
+    `changes`: the changes by some observations, then the reversals of these changes in reverse order, so that all together restore
+    `tables`.
+    """
 
     tables: Tables
     changes: tuple[Row, ...]
 
     def apply_changes(self) -> None:
-        """Make all changes, one by one."""
+        """Make all changes in order, in place.  Afterwards the tables are the same as before."""
         for change in self.changes:
             self.tables.put(change)
 
 
 def with_changes(tables: Tables, observations: Iterable[Row]) -> ChangingProblem:
-    """Return the problem before the observations, with the changes that they make and the reversals."""
+    """Return the problem `tables` with changes: each row of `observations` in order, then the restored rows in reverse order."""
     forward, back = [], []
     for row in observations:
         forward.append(row)
@@ -147,7 +163,11 @@ def with_changes(tables: Tables, observations: Iterable[Row]) -> ChangingProblem
 
 
 def random_problem(seed: int) -> tuple[Tables, float]:
-    """Return a random problem and a discount; some outcome bins are empty, some actions do not exist, and some states have none."""
+    """Return a random decision problem and a discount factor, both drawn with `seed`.
+
+    The problem has empty outcome bins, positive and negative rewards, actions that do not exist (reward -inf, or no outcome), and states
+    without any action.
+    """
     rng = np.random.default_rng(seed)
     shape = tuple(int(rng.integers(2, high)) for high in (40, 9, 7))
     weights = rng.exponential(size=shape) * (rng.random(shape) < 0.7)
@@ -160,7 +180,11 @@ def random_problem(seed: int) -> tuple[Tables, float]:
 
 
 def problem_of_size(states: int, observations: int = 3, seed: int = 0) -> ChangingProblem:
-    """Return a problem with 16 actions per state to states of similar number, which succeed, stay or end elsewhere."""
+    """Return a random decision problem with this number of states, and changes of action 0 in `observations` random states.
+
+    Each state has 16 actions to states of similar number.  An action has three outcomes: the goal, the same state, or the state after the
+    goal.
+    """
     rng = np.random.default_rng(seed)
     goals = (np.arange(states)[:, None] + rng.integers(-MAX_STATE_STEP, MAX_STATE_STEP + 1, (states, ACTIONS))) % states
     stay = np.broadcast_to(np.arange(states)[:, None], goals.shape)
@@ -171,7 +195,10 @@ def problem_of_size(states: int, observations: int = 3, seed: int = 0) -> Changi
 
 
 def after_transitions(transitions: int, observations: int, seed: int = 0) -> ChangingProblem:
-    """Return the model of a curious agent of 81 states and 16 actions after `transitions` transitions, and its next observations."""
+    """Return the transition model of a curious agent after `transitions` transitions, and its next observations as changes.
+
+    The agent moves an arm with 81 states and 16 actions per state.
+    """
     space = arm_space(neighbours=ACTIONS)
     agent = CuriousAgent(space, TabularPlant(space, *half_space(space), seed=seed), seed=seed)
     agent.run(transitions)
@@ -191,9 +218,10 @@ def _tables_of(agent: CuriousAgent) -> Tables:
 
 
 def contestants(problem: ChangingProblem, discount: float = DISCOUNT, repeats: int = 20) -> dict[str, Contestant]:
-    """Return every solver of a problem; ours warm plans after each change of it, from the values before.
+    """Return a contestant for each solver of the problem, by the solver's name; each run repeats its plans `repeats` times.
 
-    Raises ArithmeticError if a peer's values are farther from the exact ones than the tolerance allows.
+    "ours, warm" plans after each change of the problem and starts from the values of the plan before.  Raises ArithmeticError if a peer's
+    values differ from the exact ones by more than the tolerance allows.
     """
     first = problem.tables
     peer = DecisionProblem(first, first.reward, discount, TOLERANCE)
@@ -216,7 +244,7 @@ def contestants(problem: ChangingProblem, discount: float = DISCOUNT, repeats: i
 
 
 def large_contestants(states: int) -> dict[str, Contestant]:
-    """Return one cold plan of a large problem: ours, and SciPy's."""
+    """Return two contestants, ours and SciPy, that each make one plan from zero values for a problem with this number of states."""
     tables = problem_of_size(states).tables
     peer = DecisionProblem(tables, tables.reward, DISCOUNT, TOLERANCE)
     return {COLD: Contestant(lambda: _plan_cold(tables), 1), SCIPY: Contestant(peer.scipy_values, 1)}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cells: the independent runs of a sweep, and their results on disk, one .npz file each, written whole or not at all."""
+"""Cells: the independent runs of a sweep, and their results on disk, one .npz file for each; an interruption leaves no incomplete file."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ _SAFE = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+=-]{0,119}")
 class Cell:
     """The settings and the seed of one run: the same cell gives the same values on any machine.
 
-    `name`: unique in its sweep and safe as a file's name, as "lattice-g0.9-50-50-s3".  `settings`: JSON values.
-    `cost`: expected duration relative to the other cells, in any unit; orders the sweep and predicts the remaining time.
+    `name`: unique in its sweep and safe as a file's name, as "lattice-g0.9-50-50-s3".  `settings`: JSON values by name.  `cost`: expected
+    duration relative to the other cells, in any unit; the longest cells run first, and the remaining time is predicted from the costs.
     """
 
     name: str
@@ -50,29 +50,29 @@ Work = Callable[[Cell], dict[str, Any]]
 
 @dataclass(frozen=True)
 class CellResult:
-    """A finished cell on disk; its values are read at first access."""
+    """A finished cell, read from its file `path`; its values are read at the first access."""
 
     cell: Cell
     seconds: float
-    """Duration of the run."""
+    """Duration of the run, s."""
     path: Path
 
     @cached_property
     def values(self) -> dict[str, Any]:
-        """The values that the run returned: JSON values and arrays."""
+        """The values that the run returned, by name: JSON values and arrays."""
         return read_values(self.path)
 
 
 FOLDER = "cells"
 CELL_FILES = (f"{FOLDER}/*.npz",)
-"""Glob patterns of the finished cells in the folder of a run."""
+"""Glob patterns that match the files of the finished cells in the folder of a run."""
 _RECORD, _ARRAY = "record", "array."  # names in the archive: of the JSON text, and the prefix of the arrays
 
 
 def write_cell(folder: Path, cell: Cell, values: dict[str, Any], seconds: float) -> None:
-    """Write a cell's values to `folder`/cells/<name>.npz, whole or not at all.
+    """Write the values of a cell to `folder`/cells/<name>.npz; an interruption leaves no incomplete file of this name.
 
-    Raises InvalidValue for a value that is neither JSON nor an array, and OSError.
+    `values`: by name.  `seconds`: duration of the run.  Raises InvalidValue for a value that is neither JSON nor an array, and OSError.
     """
     arrays = {key: value for key, value in values.items() if isinstance(value, np.ndarray)}
     record = {"cell": asdict(cell), "seconds": seconds, "values": {key: value for key, value in values.items() if key not in arrays}}
@@ -90,18 +90,18 @@ def write_cell(folder: Path, cell: Cell, values: dict[str, Any], seconds: float)
 
 
 def cell_path(folder: Path, name: str) -> Path:
-    """Return the file of a finished cell."""
+    """Return the path of a finished cell; `folder`: of the run; `name`: of the cell."""
     return folder / FOLDER / f"{name}.npz"
 
 
 def load_cells(folder: Path) -> dict[str, CellResult]:
-    """Return the finished cells of a run by name, sorted; raises InvalidValue for a damaged file."""
+    """Return the finished cells in the folder of a run, by the cell's name, sorted; raises InvalidValue for a damaged file."""
     return {path.stem: read_cell(path) for path in sorted((folder / FOLDER).glob("*.npz"))}
 
 
 @contextmanager
 def reduced_cells(folder: Path, summary: Callable[[dict[str, Any]], dict[str, Any]]) -> Iterator[Path]:
-    """Yield a temporary folder with the finished cells of a run, whose values are reduced by the summary."""
+    """Write the finished cells of a run into a temporary folder, each with the values `summary(values)`, and yield this folder."""
     with tempfile.TemporaryDirectory(prefix="mobee-cells-") as reduced:
         for one in load_cells(folder).values():
             write_cell(Path(reduced), one.cell, summary(one.values), one.seconds)
@@ -109,13 +109,13 @@ def reduced_cells(folder: Path, summary: Callable[[dict[str, Any]], dict[str, An
 
 
 def read_cell(path: Path) -> CellResult:
-    """Read one finished cell without its arrays."""
+    """Read a finished cell from its file, without its values, which are read at the first access to `CellResult.values`."""
     record = _read(path, arrays=False)[0]
     return CellResult(Cell(**record["cell"]), record["seconds"], path)
 
 
 def read_values(path: Path) -> dict[str, Any]:
-    """Read the values of one finished cell."""
+    """Read the values of a finished cell from its file: JSON values and arrays, by name."""
     record, arrays = _read(path, arrays=True)
     return {**record["values"], **arrays}
 

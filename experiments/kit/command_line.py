@@ -11,14 +11,14 @@ from types import TracebackType
 
 
 def positive_whole(text: str) -> int:
-    """Parse a whole number of 1 or more."""
+    """Return the whole number of 1 or more that `text` states; raises argparse.ArgumentTypeError for any other text."""
     if not (text.isascii() and text.isdecimal() and int(text) > 0):
         raise argparse.ArgumentTypeError(f"{text!r} is not a positive whole number")
     return int(text)
 
 
 def whole_from_two(text: str) -> int:
-    """Parse a whole number of 2 or more."""
+    """Return the whole number of 2 or more that `text` states; raises argparse.ArgumentTypeError for any other text."""
     number = positive_whole(text)
     if number < 2:
         raise argparse.ArgumentTypeError(f"{text!r} is less than 2")
@@ -26,7 +26,7 @@ def whole_from_two(text: str) -> int:
 
 
 def positive_number(text: str) -> float:
-    """Parse a finite number above 0."""
+    """Return the finite number above 0 that `text` states; raises argparse.ArgumentTypeError for any other text."""
     try:
         number = float(text)
     except ValueError:
@@ -41,14 +41,17 @@ PERIOD = 0.1  # s between two drawings
 
 
 class Progress:
-    """A progress bar on standard error, if that is a terminal; otherwise nothing is printed."""
+    """A progress bar on standard error, for a `with` statement; nothing is printed if standard error is not a terminal."""
 
     def __init__(self) -> None:
         self._is_shown = sys.stderr.isatty()
         self._next = 0.0
 
     def show(self, fraction: float, text: str) -> None:
-        """Show a fraction 0..1 and a text; at most one drawing each PERIOD, so it can be called often."""
+        """Draw the bar with the finished `fraction`, 0 to 1, and a text after it.
+
+        It may be called often: calls within PERIOD (0.1 s) of the last drawing do nothing.
+        """
         now = time.monotonic()
         if not self._is_shown or now < self._next:
             return

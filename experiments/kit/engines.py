@@ -31,7 +31,11 @@ def cores() -> int:
 
 
 def in_processes(work: Work, cells: Sequence[Cell], jobs: int | None) -> Iterator[Done]:
-    """Run the cells in processes of this machine and yield them as they finish, in any order; a single job runs in this process."""
+    """Run the cells in `jobs` processes of this machine, and yield each as it finishes, in any order; with one job, in this process.
+
+    `work`: computes the values of a cell; a function of a module, so that other processes can import it.  `jobs`: None: one for each
+    processor core.
+    """
     count = min(jobs or cores(), len(cells))
     if count == 1:
         yield from (do(work, cell) for cell in cells)
@@ -151,7 +155,11 @@ def _worker_environment() -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Done:
-    """A cell that was run: its values, or its error."""
+    """A cell that was run.
+
+    `seconds`: duration of the run.  `values`: what the run returned, by name; None if it failed.  `error`: the traceback, or how its
+    process died; "" if the run succeeded.
+    """
 
     cell: Cell
     seconds: float
@@ -160,12 +168,12 @@ class Done:
 
     @property
     def reason(self) -> str:
-        """The last line of the error."""
+        """The last line of the error text; "" if the run succeeded."""
         return self.error.strip().rpartition("\n")[2]
 
 
 def do(work: Work, cell: Cell) -> Done:
-    """Run a cell; an exception is caught and returned in the result."""
+    """Run `work` on a cell, and return its values and duration; an exception is caught, and its traceback is returned as `error`."""
     start = time.monotonic()
     try:
         values = work(cell)
@@ -175,13 +183,15 @@ def do(work: Work, cell: Cell) -> Done:
 
 
 class RayMissing(MobeeError):
-    """Raised when Ray is asked for and not installed."""
+    """Raised if the engine "ray" is selected and the package Ray is not installed."""
 
 
 def on_ray(work: Work, cells: Sequence[Cell], jobs: int | None) -> Iterator[Done]:
-    """Run the cells on the Ray cluster of this machine, or on its own cores, and yield them as they finish, in any order.
+    """Run the cells on the Ray cluster that this machine belongs to, and yield each as it finishes, in any order.
 
-    MoBeE must be installed on all machines of the cluster.  Raises RayMissing.
+    Without a cluster, Ray runs the cells on this machine alone.  `work`: computes the values of a cell; a function of a module.  `jobs`:
+    number of cells that run at the same time; None: one for each processor.  MoBeE must be installed on all machines of the cluster.
+    Raises RayMissing.
     """
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # sends no usage statistics
     os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")  # Ray's future default; silences its warning

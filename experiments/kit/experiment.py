@@ -16,9 +16,9 @@ from experiments.kit.statistics import error_rate
 from mobee.errors import InvalidValue, UnknownName
 
 OUR_AIM = "aim of this reproduction"
-"""Source, or part of the source, of a claim that is our own: it is met or not met."""
+"""Text in the source of a claim that is not published but an aim of our own: the verdict on an aim is "met", "not met" or "open"."""
 Verdict = Literal["confirmed", "stronger", "depends", "not reproduced", "refuted", "open", "met", "not met"]
-"""See `verdict_of`."""
+"""The verdict on a claim or on an aim of our own: VERDICTS states what each one means, and `verdict_of` when it is given."""
 VERDICTS: Mapping[Verdict, str] = {
     "confirmed": "our numbers agree with the publication",
     "stronger": "the effect has the published direction, and is larger than published",
@@ -37,7 +37,8 @@ Holds = bool | None | Literal["stronger"]
 class Envelope:
     """Whether a claim holds in each setting of something that the publications leave open.
 
-    `what`: what differs between the settings, as "unit of distance".  `holds`: by setting, as "1 cm".
+    `what`: what differs between the settings, as "unit of distance".  `holds`: whether the claim holds, by the name of the setting, as "1
+    cm".
     """
 
     what: str
@@ -45,20 +46,20 @@ class Envelope:
 
 
 Measured = tuple[str, Holds | Envelope]
-"""Our numbers with their intervals as text, and whether the claim holds."""
+"""The result of a rule: our numbers with their intervals as text, and whether the claim holds, in one setting or in each."""
 Rule = Callable[[Any], Measured | None]
-"""Computes `Measured` from the runs of an experiment, in the form in which the experiment groups them; None: they are too few."""
+"""Function of an experiment's runs, in the form in which the experiment groups them; returns `Measured`, or None for too few runs."""
 MIN_SEEDS = 5  # repetitions for a verdict: a bootstrap interval of fewer values is too narrow
 _WORDS: Mapping[Holds, str] = {True: "holds", "stronger": "stronger than published", None: "open", False: "fails"}
 _PAIR = " / "  # between the names of two settings that vary together
 
 
 def verdict_of(holds: Holds | Envelope, is_aim: bool = False, untested: bool = True) -> Verdict:
-    """Return the verdict from the outcome in each setting.
+    """Return the verdict on a claim from its outcome, or from its outcomes in several settings; `is_aim`: the claim is an aim of our own.
 
-    A claim that holds in some settings and fails in others depends on the settings.  A claim that fails in all settings is refuted if
-    there are at least two settings and `untested` is false, else it is not reproduced; `untested` is true if the experiment did not
-    vary something that the publications leave open and that could explain a failure.  An aim that fails in one setting is not met.
+    A claim that holds in some settings and fails in others depends on the settings.  A claim that fails in all settings is refuted if there
+    are at least two settings and `untested` is false, else it is not reproduced; `untested` is true if the experiment did not vary
+    something that the publications leave open and that could explain a failure.  An aim that fails in one setting is not met.
     """
     each = list(holds.holds.values()) if isinstance(holds, Envelope) else [holds]
     fails, undecided = False in each, None in each or not each
@@ -74,9 +75,11 @@ def verdict_of(holds: Holds | Envelope, is_aim: bool = False, untested: bool = T
 
 
 def in_settings(what: str, rule: Rule, settings: Mapping[str, Any]) -> Measured | None:
-    """Judge by a rule in each setting of `what`; the text is that of the first setting, and of those with another verdict.
+    """Judge a claim by its rule in each of several settings; returns None if the rule returns None in all settings.
 
-    If the rule itself returns an Envelope, that stays as it is where it is the same in all settings; else each pair is a setting.
+    `what`: what differs between the settings, as "unit of distance".  `settings`: the runs in each setting, by its name.  The text has our
+    numbers in the first setting, and in each other setting with another outcome.  If the rule returns an Envelope, and the same one in all
+    settings, then this is the outcome; if the Envelopes differ, each pair of an outer and an inner setting counts as a setting.
     """
     each = {name: found for name, runs in settings.items() if (found := rule(runs)) is not None}
     if not each:
@@ -112,21 +115,20 @@ def _merged(names: Sequence[str], every: Sequence[str]) -> list[str]:
 class Claim:
     """A row of the table of claims.
 
-    An experiment returns its claims measured, as dicts, under "claims" in its results; see `judged`.
+    The results of an experiment have its measured claims, as dicts, under "claims"; `judged` makes these dicts.
 
     Args:
-        source: where it was published, as "thesis 7.2.1, fig. 7.5"; contains `OUR_AIM` if it is ours.
+        source: where the claim was published, as "thesis 7.2.1, fig. 7.5"; contains OUR_AIM ("aim of this reproduction") if it is ours.
         text: the claim.
         published: the published number.
         ours: our numbers with their intervals.
-        verdict: see `verdict_of`.
-        settings: in which settings it holds and fails, if there are several.
-        p: the smallest error rate of the intervals at which they give the same verdict, at least MIN_RATE; 1 if they decide nothing at the
-            usual rate, None if the verdict uses no interval.
-        rule: how the experiment measures and judges it, a function of its own below the decorator `claim`, or one of
-            experiments.kit.rules.
-        varies: what differs between the settings in which it is judged, as "unit of distance"; its rule gets the runs of one setting, and
-            the experiment groups its runs by setting.  "": there is one setting, or the rule itself returns an Envelope.
+        verdict: one of VERDICTS, which states their meanings.
+        settings: in which settings the claim holds and in which it fails, as text; "" if it is judged in one setting.
+        p: p value: the smallest error rate of the intervals, at least MIN_RATE (0.001), at which the verdict stays the same; 1 if the
+            intervals do not decide at the usual rate of 0.05; None if the verdict uses no interval.
+        rule: function that measures and judges the claim: the function below the decorator `claim`, or one of experiments.kit.rules.
+        varies: what differs between the settings in which the claim is judged, as "unit of distance"; the rule gets the runs of one
+            setting, and the experiment groups its runs by setting.  "": there is one setting, or the rule itself returns an Envelope.
         untested: what the publications leave open and no run varies, if it could explain a failure; "" if there is nothing.
     """
 
@@ -147,30 +149,30 @@ class Claim:
 
     @property
     def is_aim(self) -> bool:
-        """Whether the claim is our own."""
+        """Whether the claim is not published but an aim of our own."""
         return OUR_AIM in self.source
 
     def measured(self, ours: str, holds: Holds | Envelope) -> Claim:
-        """Return the claim with the measured numbers `ours` and its verdict."""
+        """Return the claim with the text `ours` of the measured numbers, and with the verdict that follows from `holds`."""
         settings = _by_setting(holds) if isinstance(holds, Envelope) else ""
         return replace(self, ours=ours, verdict=verdict_of(holds, self.is_aim, bool(self.untested)), settings=settings)
 
     def undecided(self, why: str) -> Claim:
-        """Return the claim as open, with the reason beside its numbers."""
+        """Return the claim with the verdict "open" and with the reason `why` after its numbers; an open claim is returned unchanged."""
         return self if self.verdict == "open" else replace(self, ours=f"{self.ours} ({why})", verdict="open")
 
     def record(self) -> dict[str, Any]:
-        """Return the claim as a dict for JSON, without its rule."""
+        """Return the claim as a dict for JSON, by field; the fields `rule`, `varies` and `untested` are left out."""
         return {name: getattr(self, name) for name in ("source", "text", "published", "ours", "verdict", "settings", "p")}
 
 
 def claim(source: str, text: str, published: str, varies: str = "", untested: str = "") -> Callable[[Rule], Claim]:
-    """Return a decorator that makes a rule the claim that it measures; see `Claim`."""
+    """Return a decorator that turns a rule (a function that measures and judges) into a `Claim`; the arguments are fields of `Claim`."""
     return lambda rule: Claim(source, text, published, rule=rule, varies=varies, untested=untested)
 
 
 def judged(claims: Iterable[Claim], runs: Any, complete: bool = True) -> list[dict[str, Any]]:
-    """Return the claims as dicts, measured by their rules from the runs; none is measured unless the runs are `complete`."""
+    """Return the claims as dicts, measured and judged by their rules from `runs`; if the runs are not `complete`, all stay unmeasured."""
     return [(_by_rule(claim, runs) if complete else claim).record() for claim in claims]
 
 
@@ -192,36 +194,40 @@ def _by_rule(claim: Claim, runs: Any) -> Claim:
 class Method(Protocol):
     """The functions that run an experiment and draw its figure.
 
-    `run` writes into the folder of a run and may be interrupted at any time: finished parts are on disk, and the next call
-    continues after them.  If its result `passed` is False, the command fails.
+    `run` writes into the folder of a run.  It may be interrupted at any time: finished parts are on disk, and the next call continues after
+    them.  If the results that it returns have the value False under "passed", `mobee experiment run` fails.
     """
 
     @property
     def kept(self) -> tuple[str, ...]:
-        """Glob patterns of the files from which `results` and `figure` compute: the record of a run (see experiments.kit.raw_records)."""
+        """Glob patterns of the files from which `results` and `figure` compute; these files are the raw record of a run."""
 
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
-        """Add the options of the experiment; `--seed`, `--runs`, `--resume` and `--json` exist already."""
+        """Add the options of the experiment to the parser, which has `--seed`, `--runs`, `--resume` and `--json` already."""
 
     def run(self, arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-        """Run the experiment; returns its results as JSON values."""
+        """Run the experiment with these options, and return its results as JSON values; `folder`: where it writes what is finished."""
 
     def recorded(self, folder: Path) -> AbstractContextManager[Path]:
-        """Return a folder with the `kept` files of a finished run, for its record."""
+        """Return a context manager that yields a folder with the files of a finished run that match `kept`, for its raw record.
+
+        `folder`: of the run.  The yielded folder is this one, or a temporary one with reduced values.
+        """
 
     def results(self, folder: Path) -> dict[str, Any]:
-        """Compute the results of a finished run from its `kept` files; raises InvalidValue if the experiment keeps none."""
+        """Compute the results of a run from the files in its folder that match `kept`; raises InvalidValue if the experiment keeps none."""
 
     def figure(self, folder: Path) -> Path:
-        """Draw the results in the folder of a run; returns the path of the picture."""
+        """Draw the results of the run in `folder`, and return the path of the picture."""
 
 
 @dataclass(frozen=True)
 class Steps:
-    """A method made of functions, for an experiment that is not a sweep; see `Method`.
+    """A `Method` made of functions, for an experiment that is not a sweep.
 
-    `recomputed`: computes `results` from the files `kept`; None for an experiment without claims.  `summary`: reduces the values of each
-    cell for the record, if `kept` are cells; reduced values give the same results, and stay as they are when they are reduced again.
+    `add_arguments`, `run`, `figure`, `kept`: as in `Method`.  `recomputed`: function that computes the results from the folder of a run;
+    None for an experiment without claims.  `summary`: function that reduces the values of each cell for the raw record, if the files `kept`
+    are cells; the reduced values must give the same results, and must not change if they are reduced again.
     """
 
     add_arguments: Callable[[argparse.ArgumentParser], None]
@@ -232,11 +238,11 @@ class Steps:
     summary: Callable[[dict[str, Any]], dict[str, Any]] | None = None
 
     def recorded(self, folder: Path) -> AbstractContextManager[Path]:
-        """Return the folder of the run, or with a `summary` a temporary one with the reduced cells."""
+        """Return a context manager that yields the folder of the run, or with a `summary` a temporary folder with the reduced cells."""
         return nullcontext(folder) if self.summary is None else reduced_cells(folder, self.summary)
 
     def results(self, folder: Path) -> dict[str, Any]:
-        """Compute the results from the `kept` files in the folder."""
+        """Compute the results of a run from the files in its folder that match `kept`; raises InvalidValue if `recomputed` is None."""
         if self.recomputed is None:
             raise InvalidValue(f"{folder}: this experiment has no claims, and keeps no record from which its results are computed.")
         return self.recomputed(folder)
@@ -244,11 +250,16 @@ class Steps:
 
 @dataclass(frozen=True)
 class Experiment:
-    """An experiment as `mobee experiment` lists and runs it; the module of a claim holds one as EXPERIMENT.
+    """An experiment as `mobee experiment` lists and runs it; the module of an experiment has one as EXPERIMENT.
 
-    `claim`: one line.  `claims`: its rows in the table of claims; their measured numbers are in the results under "claims".  `repeats`: the
-    option that says how often a run repeats its measurement; with fewer than MIN_SEEDS repetitions no claim is decided.  `name` and
-    `notes`, the docstring of the module, which states claim, source, published numbers and run time, are set by `experiments.registry`.
+    Attributes:
+        claim: one line that states what the experiment tests.
+        source: where this was published.
+        method: the functions that run the experiment and draw its figure.
+        claims: its rows in the table of claims; the measured ones are in the results, under "claims".
+        repeats: name of the option with the number of repetitions of a run; with fewer than MIN_SEEDS (5) no claim is decided.
+        name: name of the experiment on the command line, set by `experiments.registry`.
+        notes: docstring of the module, with claim, source, published numbers and run time, set by `experiments.registry`.
     """
 
     claim: str
@@ -260,11 +271,14 @@ class Experiment:
     notes: str = ""
 
     def repetitions(self, made: int | None) -> str:
-        """Return how often a run repeated its measurement, as text: "10 seeds", "1 seed", "no seeds"."""
+        """Return the number of repetitions of a run as text: "10 seeds", "1 seed", or "no seeds" for None."""
         return f"{made or 'no'} {self.repeats.removesuffix('s') if made == 1 else self.repeats}"
 
     def decided(self, results: Mapping[str, Any], options: Mapping[str, Any]) -> dict[str, Any]:
-        """Return results in which all claims are open if the run repeated its measurement too rarely; the numbers are kept."""
+        """Return the results of a run; with fewer than MIN_SEEDS (5) repetitions, all claims in them become open and keep their numbers.
+
+        `options`: of the run, by name.
+        """
         made = options.get(self.repeats)
         if "claims" not in results or (made is not None and made >= MIN_SEEDS):
             return dict(results)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A plant with MuJoCo in one process: model, controller and physics tick by tick, as the live system runs them in lockstep.
 
-The model knows a world of its own, in which things are where they are believed to be; the physics has the true one.
+The model has a world with the things where they are believed to be; the physics has another world, with the things where they truly are.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ SLOW = float(np.deg2rad(1.0))  # rad/s, of motors at rest
 
 
 class PhysicsPlant:
-    """A ReachPlant whose body MuJoCo moves, with the law's default gains and motors as published.
+    """A `mobee.reach.ReachPlant` whose body MuJoCo simulates, under the law's default gains and with the published motors.
 
     Args:
         model: the robot in the world as it is believed to be.
-        truth: the world of the physics.
+        truth: the world of the physics, as it truly is.
         seed: of the encoders' noise.
         start: (n,) rad, the posture at the start, at rest.
-        torques: see `with_torques`.
+        torques: largest torques of motors, N m, by pattern of motor names, as "?_pinky"; the other motors keep those of the robot's file.
     """
 
     def __init__(self, model: Model, truth: World, seed: int, start: Array, torques: Mapping[str, float]) -> None:
@@ -59,33 +59,33 @@ class PhysicsPlant:
         self._ticks = 0
         self._watch: Callable[[float], None] | None = None
         self.exempt: str | None = None
-        """A marker whose hand the targets do not push."""
+        """Name of a marker on whose hand the targets exert no force; None: no marker."""
 
     @property
     def q(self) -> Array:
-        """See Plant."""
+        """The present encoder values of all motors, (n,) rad, in the order of `robot.motors`."""
         return self._encoders.copy()
 
     @property
     def time(self) -> float:
-        """Simulated time, s."""
+        """The simulated time since the start, s."""
         return self._ticks * self.dt
 
     @property
     def things(self) -> Mapping[str, WorldObject]:
-        """The objects as they truly are."""
+        """The objects of the physics by name, where they truly are."""
         return self.body.world.objects
 
     def every_tick(self, callback: Callable[[float], None] | None) -> None:
-        """Call a function with the time [s] after every tick, as for pictures; None: no more."""
+        """Call `callback` with the simulated time [s] after every tick, for example to take pictures; None: call nothing any more."""
         self._watch = callback
 
     def measure(self, part: str) -> Array:
-        """See Plant."""
+        """Return the present encoder values of the part's motors, (n_part,) rad."""
         return self._encoders[self.robot.part(part).slice].copy()
 
     def tick(self) -> None:
-        """Run one control tick; a command moves the motors in the tick after the one in which it was computed."""
+        """Run one control tick (10 ms); a command moves the motors in the tick after the one in which it was computed."""
         self._ticks += 1
         self._encoders = self.body.motors.encoders(self._ticks, self.dt)
         reaching = self._reaches.reaching
@@ -100,22 +100,26 @@ class PhysicsPlant:
             self._watch(self.time)
 
     def run(self, seconds: float) -> None:
-        """Run for a time."""
+        """Run control ticks for `seconds` of simulated time."""
         for _ in range(round(seconds / self.dt)):
             self.tick()
 
     def act(self, part: str, target: Array) -> Outcome:
-        """See Plant."""
+        """Set the part's attractor to `target` (n_part,) rad and run until it has settled or timed out, as in `mobee.plant.Plant.act`."""
         self._reaches.drop(part)
         self.controller.set_attractor(part, target)
         return self._settled(part)
 
     def present(self, target: ReachTarget | None) -> None:
-        """See ReachPlant."""
+        """Put the target into the world of the model, or move it there; None removes it, as in `mobee.reach.ReachPlant.present`."""
         self._reaches.present(target)
 
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
-        """See ReachPlant."""
+        """Pull the marker to the presented target until the part has settled or timed out, as in `mobee.reach.ReachPlant.reach`.
+
+        `stay`: the attractor moves to the pose in which the reach ended; otherwise the attractor pulls the part back when the force has
+        ended.
+        """
         self._reaches.begin(part, marker, stay)
         end = self._settled(part)
         while self._reaches.ended(part, end, self.model.evaluate(self._encoders)):
@@ -123,7 +127,11 @@ class PhysicsPlant:
         return self._reaches.outcome(part)
 
     def follow_path(self, path: Array, speed: float, watch: BumpWatch | None = None, forces: Forces | None = None) -> Followed:
-        """See Body; after a bump the robot moves back a little."""
+        """Move along a path (K, n) rad at a share `speed` of the largest speed, as in `mobee.behaviours.pick.Body.follow_path`.
+
+        `watch`: detects bumps; after a bump the robot moves back a little and the motion ends; None: no detection.  `forces`: the law's
+        forces (n,) rad/s^2 at a posture (n,) rad, which the attractors balance; None: the attractors balance none.
+        """
         wanted = timed(self.robot, np.clip(path, *self.robot.limits.T), self.controller.gains, speed)
         if watch is not None:
             watch.begin()
@@ -141,12 +149,12 @@ class PhysicsPlant:
         return Followed(False, self.q)
 
     def press(self, q: Array, seconds: float) -> None:
-        """See Body."""
+        """Set the attractor to q (n,) rad at once, and run for `seconds`."""
         self.controller.attractor = q
         self.run(seconds)
 
     def rest_at(self, q: Array) -> None:
-        """See Body."""
+        """Set the attractor to q (n,) rad, and run until no motor is commanded to move, but not longer than 1.5 s."""
         self.controller.attractor = q
         self._calm()
 

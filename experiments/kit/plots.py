@@ -16,11 +16,14 @@ from mobee.errors import InvalidValue, MobeeError
 
 
 class MatplotlibMissing(MobeeError):
-    """Raised when a figure is asked for and Matplotlib is not installed."""
+    """Raised if a figure is requested and the package Matplotlib is not installed."""
 
 
 def new_figure(width: float, height: float) -> Any:
-    """Return an empty matplotlib Figure of a size in inches; raises MatplotlibMissing, and InvalidValue for a size of 0."""
+    """Return an empty Matplotlib Figure of this width and height in inches.
+
+    Raises MatplotlibMissing, and InvalidValue for a size of 0, which a figure has if none of the runs that it shows is finished.
+    """
     if not (width > 0.0 and height > 0.0):
         raise InvalidValue("none of the runs that the figure shows is finished: continue the run with --resume.")
     try:
@@ -31,14 +34,14 @@ def new_figure(width: float, height: float) -> Any:
 
 
 def saved(drawing: Any, folder: Path, dpi: int = 150) -> Path:
-    """Save a Figure as figure.png in the folder of a run; returns its path."""
+    """Save a Matplotlib Figure as figure.png in the folder of a run, with `dpi` pixels per inch; returns the path."""
     path = folder / "figure.png"
     drawing.savefig(path, dpi=dpi)
     return path
 
 
 def finish(axes: Any, legend: float = 0.0, **settings: Any) -> None:
-    """Set labels, limits and scales (as `axes.set`), draw a faint grid, and a legend if it has a font size."""
+    """Set labels, limits and scales by `axes.set(**settings)`, and draw a faint grid, and a legend of font size `legend` (0: none)."""
     axes.set(**settings)
     axes.grid(alpha=0.2)
     if legend:
@@ -46,7 +49,10 @@ def finish(axes: Any, legend: float = 0.0, **settings: Any) -> None:
 
 
 def finish_normalised(axes: Any) -> None:
-    """Add to distributions of normalised squared errors in 3-D that of a correct covariance, labels and a legend."""
+    """Complete a plot of cumulative distributions of normalised squared errors in 3-D.
+
+    Adds the chi-squared distribution with 3 degrees of freedom, which the errors have if their covariance is correct, labels and a legend.
+    """
     from scipy.special import chdtr
 
     grid = np.linspace(0.0, 12.0, 300)
@@ -56,44 +62,63 @@ def finish_normalised(axes: Any) -> None:
 
 
 def ticks_at(axes: Any, places: Sequence[float], labels: Sequence[str] | None = None) -> None:
-    """Mark only these places on the x axis, by default with their numbers."""
+    """Mark only the values `places` on the x axis, with `labels`; None: with the numbers themselves."""
     axes.set_xticks(places, [f"{place:g}" for place in places] if labels is None else labels)
     axes.minorticks_off()
 
 
 def draw_curve(axes: Any, at: ArrayLike, runs: Array, color: str, label: str) -> None:
-    """Draw the means of the runs (N, L) at L places as a line, and their intervals as a band."""
+    """Draw the interquartile means of N runs at L places of the x axis as a line, and their 95 % bootstrap intervals as a band.
+
+    `at`: (L,) x values.  `runs`: (N, L), a row for each run.
+    """
     draw_band(axes, at, list(runs.T), "o-", color=color, label=label, markersize=4)
 
 
 def draw_band(axes: Any, at: ArrayLike, groups: Sequence[ArrayLike], line: str, color: str, alpha: float = 0.15, **style: Any) -> None:
-    """Draw the mean of each group of runs as a line, and their intervals as a band; `style`: passed to Matplotlib's plot."""
+    """Draw the interquartile mean of each group of runs as a line, and the 95 % bootstrap intervals as a band.
+
+    `at`: x value of each group.  `groups`: the numbers of the runs of each group.  `line`: Matplotlib's format of the line, as "o-".
+    `alpha`: opacity of the band.  `style`: passed to `axes.plot`.
+    """
     means, low, high = _of(groups)
     axes.plot(at, means, line, color=color, **style)
     axes.fill_between(at, low, high, color=color, alpha=alpha, linewidth=0.0)
 
 
 def draw_bars(axes: Any, at: ArrayLike, groups: Sequence[Array], width: float, color: str, label: str) -> None:
-    """Draw the mean of each group of runs as a bar, and its interval as a whisker."""
+    """Draw the interquartile mean of each group of runs as a bar, and its 95 % bootstrap interval as a whisker.
+
+    `at`: x value of each group.  `groups`: the numbers of the runs of each group.  `width`: of a bar, in units of the x axis.
+    """
     means, low, high = _of(groups)
     spread = np.maximum([means - low, high - means], 0.0)  # an interval need not hold the mean
     axes.bar(at, means, width, yerr=spread, color=color, label=label, capsize=3)
 
 
 def draw_points(axes: Any, at: ArrayLike | Sequence[str], groups: Sequence[ArrayLike], **style: Any) -> None:
-    """Draw the mean and the interval of each group of runs; `style`: passed to Matplotlib's errorbar."""
+    """Draw the interquartile mean of each group of runs as a point, and its 95 % bootstrap interval as a whisker.
+
+    `at`: x value or label of each group.  `groups`: the numbers of the runs of each group.  `style`: passed to `axes.errorbar`.
+    """
     means, low, high = _of(groups)
     spread = np.maximum([means - low, high - means], 0.0)  # an interval need not hold the mean
     axes.errorbar(at, means, spread, **style)
 
 
 def draw_heights(axes: Any, values: ArrayLike, **style: Any) -> None:
-    """Draw many numbers as adjacent bars at 0, 1, ... in one patch: a rectangle for each of thousands takes seconds."""
+    """Draw many numbers as adjacent bars at x = 0, 1, ... in one patch, because thousands of separate rectangles take seconds.
+
+    `style`: passed to `axes.stairs`.
+    """
     axes.stairs(values, np.arange(np.size(values) + 1) - 0.5, fill=True, **style)
 
 
 def draw_stacked_bars(axes: Any, runs: Sequence[Array]) -> Array:
-    """Draw runs of equally many numbers as stacked bars, a colour for each run; returns the heights of the bars."""
+    """Draw the numbers of several runs as stacked bars at x = 0, 1, ..., with a colour for each run; returns the total heights (L,).
+
+    `runs`: L numbers of each run.
+    """
     heights = np.zeros(len(runs[0]))
     for run in runs:
         draw_heights(axes, heights + run, baseline=heights)

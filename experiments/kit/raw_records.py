@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Raw records: the values of every seed of a run, with settings and commit, in one archive per experiment.
 
-The archives are part of the repository.  Anybody can compute all verdicts, intervals and figures from them again, without a new run.
-Their files are compressed together, since those of one experiment are much alike: that takes less than half the room of a .zip.
+The archives are part of the repository.  Anybody can compute all verdicts, intervals and figures from them again, without a new run.  The
+files of an experiment are similar to each other, so they are compressed together: the archive has less than half the size of a .zip.
 """
 
 from __future__ import annotations
@@ -26,33 +26,33 @@ _NO_TIME = (1980, 1, 1, 0, 0, 0)  # the same files give the same archive
 
 
 class TooLarge(InvalidValue):
-    """Raised for a record that is too large for the repository."""
+    """Raised for a raw record that is too large for the repository: more than MAX_BYTES (2 MB)."""
 
 
 def record_path(name: str, confirms: bool = False) -> Path:
-    """Return the archive of an experiment, or with `confirms` of its run with new seeds."""
+    """Return the path of the archive of an experiment; `confirms`: of the archive of its run with new seeds."""
     return RECORDS / f"{name}{'-confirm' if confirms else ''}{_SUFFIX}"
 
 
 def all_records() -> list[Path]:
-    """Return all archives, sorted."""
+    """Return the paths of all archives, sorted."""
     return sorted(RECORDS.glob(f"*{_SUFFIX}"))
 
 
 def keep_record(name: str, run: Path, versions: Path, kept: Sequence[str], confirms: bool = False, folder: Path | None = None) -> Path:
-    """Write the archive of a finished run, whole or not at all.
+    """Write the archive of a finished run and return its path; an interruption leaves no incomplete archive.
 
     Args:
-        name: of the experiment.
+        name: name of the experiment.
         run: folder of the run, with config.json.
-        versions: the versions.json of the run.
-        kept: glob patterns of files in `folder`.
-        confirms: whether the run confirms the first one with new seeds; its archive is written once.
-        folder: with the kept files; None: that of the run.
+        versions: path of the versions.json of the run.
+        kept: glob patterns of the files in `folder` that are recorded.
+        confirms: whether the run has new seeds and confirms an earlier one; its archive cannot be replaced by that of another run.
+        folder: folder with the files `kept`; None: `run`.
 
     Raises:
-        InvalidValue: no file matches, or another run has confirmed the experiment.
-        TooLarge: the archive would be larger than MAX_BYTES.
+        InvalidValue: no file matches, or another run has confirmed the experiment already.
+        TooLarge: the archive would be larger than MAX_BYTES (2 MB).
     """
     place = run if folder is None else folder
     files = sorted({path for pattern in kept for path in place.glob(pattern)})
@@ -106,9 +106,9 @@ def _unpacked(path: Path) -> bytes:
 
 @contextmanager
 def opened_record(name: str, confirms: bool = False) -> Iterator[Path]:
-    """Extract the archive of an experiment; yields a folder like that of its run, and removes it afterwards.
+    """Extract the archive of an experiment into a temporary folder, which has the files of the run's folder, and yield this folder.
 
-    Raises InvalidValue if there is none, or if it is damaged.
+    `confirms`: the archive of its run with new seeds.  Raises InvalidValue if there is no archive, or if it is damaged.
     """
     path = record_path(name, confirms)
     if not path.exists():

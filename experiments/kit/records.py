@@ -12,7 +12,10 @@ from typing import Any, ClassVar, Self, TextIO
 
 
 class Records:
-    """A CSV file with a header; each record is on disk when `append` returns.  An incomplete last line is removed on opening."""
+    """A CSV file with a header, to which records are appended; each record is written to the file when `append` returns.
+
+    `columns`: names of the columns.  When an existing file is opened, an incomplete last line is removed.
+    """
 
     def __init__(self, path: Path, columns: tuple[str, ...]) -> None:
         self.path, self.columns = path, columns
@@ -21,7 +24,7 @@ class Records:
         self._writer = csv.DictWriter(self._file, columns)
 
     def append(self, record: Mapping[str, object]) -> None:
-        """Write one record with all columns, and the header before the first."""
+        """Write one record, a value for each column, and before the first record the header."""
         if self._file.tell() == 0:
             self._writer.writeheader()
         self._writer.writerow(record)
@@ -35,7 +38,7 @@ class Records:
 
 
 def read_records(path: Path, columns: tuple[str, ...]) -> list[dict[str, str]]:
-    """Return all complete records; [] if there is no file."""
+    """Return all complete records of a CSV file, each as a dict from column name to text, with these columns; [] if there is no file."""
     if not path.exists():
         return []
     with path.open(newline="") as file:
@@ -54,23 +57,26 @@ def _whole(file: TextIO) -> int:
 
 
 def rounded(**values: Any) -> dict[str, Any]:
-    """Return the values of a cell; numbers are rounded to six places."""
+    """Return the keyword arguments as a dict, the values of a cell; floats are rounded to six decimals."""
     return {name: round(value, 6) if isinstance(value, float) else value for name, value in values.items()}
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """Base class of records that are dataclasses with fields of type str, int, float and bool."""
+    """Base class of dataclasses that are records of a CSV file; their fields are of type str, int, float or bool."""
 
     PLACES: ClassVar[int | None] = 6  # of numbers in the record; None: all digits
 
     @classmethod
     def columns(cls) -> tuple[str, ...]:
-        """Return the column names of the file."""
+        """Return the column names of the file, which are the names of the fields."""
         return tuple(field.name for field in fields(cls))
 
     def record(self) -> dict[str, object]:
-        """Return the record for the file, in ASCII, or as the values of a cell; numbers are rounded to PLACES."""
+        """Return the fields by name, as a record of the file or as the values of a cell.
+
+        Floats are rounded to PLACES decimals (None: not rounded); characters of texts that are not ASCII are written as escapes.
+        """
         return {name: self._written(getattr(self, name)) for name in self.columns()}
 
     def _written(self, value: object) -> object:
@@ -80,6 +86,6 @@ class Row:
 
     @classmethod
     def of_record(cls, row: Mapping[str, str]) -> Self:
-        """Return the record read from a row of the file."""
+        """Return the object that a row of the file describes; `row`: text by column name, as `read_records` returns it."""
         read: dict[str, Any] = {"float": float, "int": int, "bool": "True".__eq__, "str": str}
         return cls(**{field.name: read[str(field.type)](row[field.name]) for field in fields(cls)})

@@ -50,12 +50,14 @@ BOTH_HANDS = ("torso", *LEFT_ARM, *RIGHT_ARM)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Example:
-    """The arguments of `mobee.build_roadmap` for one roadmap, and a motion through it for pictures.
+    """The arguments of `mobee.build_roadmap` for one roadmap, and a motion through the roadmap for pictures.
 
-    `figure`: number in the thesis.  `spacing`: in the units of the task coordinates.  `motors`: names of the moving motors or parts.
-    `start`: (n,) rad, start of the search and posture of all other motors; None: home.  `markers`: their positions show the map.
-    `via`: task coordinates through which the motion of the filmstrip passes, in order.  `views`: of the filmstrip.
-    `margin`: distance of the motors from their limits [rad]; with MARGIN the control law lets the robot rest in every pose.
+    `title`, `figure`: of the pictures, and number of the figure in the thesis.  `costs`: terms that every pose must satisfy.  `task`: the
+    task space.  `spacing`: distance between vertices, in the units of the task coordinates.  `motors`: names of the moving motors or parts.
+    `start`: (n,) rad, start of the search and posture of all other motors; None: home.  `markers`: markers whose positions are drawn for
+    every vertex.  `via`: task coordinates through which the motion of the filmstrip passes, in order.  `views`: camera views of the
+    filmstrip.  `margin`: distance of the motors from their limits [rad]; with MARGIN (10 degrees) the control law lets the robot rest in
+    every pose.
     """
 
     title: str
@@ -75,13 +77,16 @@ class Example:
 def one_hand(model: Model, title: str, figure: str, terms: Sequence[Term], task: Task, spacing: float, **more: Any) -> Example:
     """Return an example in which torso and right arm move, the left arm is bent aside, and the law lets the robot rest in every pose.
 
-    `terms`: costs besides those of contacts and of the distance from home, which every example has.  `more`: other fields.
+    `terms`: costs besides those of contacts and of the distance from home, which every example has.  `more`: other fields of `Example`.
     """
     return _example(model, title, figure, terms, task, spacing, {"motors": ONE_HAND, "start": left_aside(model.robot)} | more)
 
 
 def both_hands(model: Model, title: str, figure: str, terms: Sequence[Term], task: Task, spacing: float, **more: Any) -> Example:
-    """Return an example in which torso and both arms move; see `one_hand`."""
+    """Return an example in which torso and both arms move, and the law lets the robot rest in every pose.
+
+    `terms`: costs besides those of contacts and of the distance from home, which every example has.  `more`: other fields of `Example`.
+    """
     return _example(model, title, figure, terms, task, spacing, {"motors": BOTH_HANDS, "markers": (LEFT, RIGHT)} | more)
 
 
@@ -99,7 +104,17 @@ def build(
     neighbours: int | None = None,
     longest: float | None = MAX_TURN,
 ) -> Roadmap:
-    """Build the roadmap of an example."""
+    """Build the roadmap of an example with `mobee.build_roadmap`.
+
+    Args:
+        example: robot, world, costs, task and motors.
+        method: how poses are searched: "nes" (evolution), "least_squares", or "hybrid" (least squares first, then evolution).
+        seed: of the random numbers.
+        file: .npz file in which the unfinished roadmap is saved, and from which the building resumes; None: not saved.
+        progress: called several times per second with the progress; None: not called.
+        neighbours: number of nearest vertices to which each vertex is joined; None: as in Algorithm 4 of the thesis.
+        longest: edges along which a motor turns by more than this [rad] are left out; None: no edge is left out.
+    """
     settings = mobee.RoadmapSettings(method, neighbours, longest, example.margin)
     return mobee.build_roadmap(
         example.model,
@@ -116,19 +131,23 @@ def build(
 
 
 def at_table() -> Model:
-    """Return the model of the iCub at its empty table."""
+    """Return a new model of the iCub at its table, with nothing on the table."""
     world = mobee.load_world("table")
     world.remove("ball")
     return Model(mobee.load_robot("icub"), world)
 
 
 def alone() -> Model:
-    """Return the model of the iCub in an empty world."""
+    """Return a new model of the iCub in an empty world."""
     return Model(mobee.load_robot("icub"), World())
 
 
 def carry(model: Model, name: str, shape: Geometry, marker: str, ahead: float, along: ArrayLike = FINGERS) -> None:
-    """Attach an object to a hand: its centre `ahead` [m] of the palm, its z axis along a direction in the palm's frame."""
+    """Attach an object of role "ghost" to a hand in the world of `model`.
+
+    `name`, `shape`: of the object.  `marker`: of the palm.  `ahead`: distance of the object's centre from the palm, along the palm's
+    normal, m.  `along`: direction (3,) of the object's z axis in the palm's frame; by default that of the fingers.
+    """
     m = model.robot.marker(marker)
     z = m.rotation @ np.asarray(along, dtype=np.float64)
     x = m.normal - (m.normal @ z) * z
@@ -140,22 +159,28 @@ def carry(model: Model, name: str, shape: Geometry, marker: str, ahead: float, a
 
 
 def left_aside(robot: Robot) -> Array:
-    """Return home with the left arm bent, so that its hand does not touch the table when the torso leans, (n,) rad."""
+    """Return the home posture (n,) rad, but with the left arm bent, so that its hand does not touch the table when the torso leans."""
     return changed(robot.home, robot, _ASIDE, "l")
 
 
 def elbows_out(q: Array, robot: Robot, sides: str = "lr") -> Array:
-    """Return a posture with the elbows away from the body, (n,) rad, from which the hands can turn far while the joints move smoothly."""
+    """Return the posture q (n,) rad, but with the elbows away from the body.
+
+    From there the hands can turn far while the joints move smoothly.  `sides`: the arms to change, "l", "r" or "lr".
+    """
     return changed(q, robot, _OUT, sides)
 
 
 def grasping(q: Array, robot: Robot, sides: str = "lr") -> Array:
-    """Return a posture with bent fingers, (n,) rad."""
+    """Return the posture q (n,) rad, but with bent fingers; `sides`: the hands to change, "l", "r" or "lr"."""
     return changed(q, robot, _BENT, sides)
 
 
 def changed(q: Array, robot: Robot, degrees: Mapping[str, float], sides: str) -> Array:
-    """Return a posture with some arm motors set to other angles, (n,) rad."""
+    """Return the posture q (n,) rad, but with other angles of some arm motors.
+
+    `degrees`: new angles by the motor's name without the side, as "elbow".  `sides`: the arms to change, "l", "r" or "lr".
+    """
     new = q.copy()
     for side in sides:
         for joint, angle in degrees.items():

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Rows of results and rules of claims, for runs from which numbers are computed and compared between groups.
 
-A group is the runs of one setting.  A rule finds True, False, or None where the numbers leave the claim open.  Intervals decide, never the
-estimates: a claim holds if the whole interval is on its side of a bound, and fails if the whole interval is on the other side.
+A group is the runs of one setting.  A rule returns True if the claim holds, False if it fails, and None if the numbers leave it open.
+Intervals decide, never the estimates: a claim holds if the whole interval is on its side of a bound, and fails if the whole interval is on
+the other side.  Means are interquartile means; intervals are bootstrap intervals.
 """
 
 from __future__ import annotations
@@ -35,28 +36,31 @@ ABOUT_EQUAL = (0.9, 1.1)
 
 
 def row(runs: Sequence[Run], columns: Mapping[str, Callable[[Run], float]]) -> dict[str, Any]:
-    """Return a row of results: the number of runs, and the interquartile mean of each column's number, computed for each run."""
+    """Return a row of results: the number of runs under "seeds", and under each label the interquartile mean over the runs.
+
+    `columns`: function that computes a number from a run, by label.
+    """
     return {"seeds": len(runs)} | {label: mean_over(runs, number) for label, number in columns.items()}
 
 
 def of_each(groups: Mapping[Key, Iterable[Run]], number: Callable[[Run], float]) -> dict[Key, list[float]]:
-    """Return a number of every run, by group."""
+    """Return for each group the list of the numbers that the function `number` computes from its runs, by the group's key."""
     return {key: [number(run) for run in runs] for key, runs in groups.items()}
 
 
 def texts(values: Mapping[Any, ArrayLike], digits: int = 2, form: str = "{} {}") -> str:
-    """Return the estimates of all groups as text, separated by commas.
+    """Return the estimates of all groups as text, separated by commas; an estimate is the interquartile mean with its 95 % interval.
 
     Args:
         values: the numbers of each group, by its key.
         digits: decimals of an estimate.
-        form: format of each entry; the first {} is the key, the second the estimate.
+        form: format of each entry; the first {} is the key, with spaces for underscores, the second the estimate.
     """
     return ", ".join(form.format(str(key).replace("_", " "), estimate(group, digits)) for key, group in values.items())
 
 
 def decides(span: tuple[float, float], least: float = -np.inf, most: float = np.inf) -> bool | None:
-    """Return True for an interval (low, high) within the bounds, False for one outside, None for one that contains a bound."""
+    """Return True for an interval (low, high) within [least, most], False for one outside, None for one that contains a bound."""
     low, high = span
     if low >= least and high <= most:
         return True
@@ -64,59 +68,81 @@ def decides(span: tuple[float, float], least: float = -np.inf, most: float = np.
 
 
 def all_hold(verdicts: Iterable[bool | None]) -> bool | None:
-    """Combine verdicts: False if one is False, else None if one is open, else True."""
+    """Return False if one of the verdicts is False, else None if one is None (open), else True."""
     given = list(verdicts)
     return False if False in given else None if None in given else True
 
 
 def within(values: ArrayLike, digits: int = 2, least: float = -np.inf, most: float = np.inf, text: str = "{}") -> Decided:
-    """Judge whether the mean of the runs lies within bounds, by its interval; `text`: holds the estimate."""
+    """Judge by the interval whether the interquartile mean of a group lies within [least, most].
+
+    Returns our number as text and the verdict.  `values`: the numbers of the runs.  `digits`: decimals of the estimate.  `text`: format of
+    the text; {} is the estimate.
+    """
     return text.format(estimate(values, digits)), decides(interval(values), least, most)
 
 
 def ratio_within(
     above: ArrayLike, below: ArrayLike, digits: int = 2, least: float = -np.inf, most: float = np.inf, text: str = "{}"
 ) -> Decided:
-    """Judge whether the ratio of two groups of runs lies within bounds, by its interval; `text`: holds the estimate."""
+    """Judge by the interval whether the ratio of the interquartile means of two groups lies within [least, most].
+
+    Returns our number as text and the verdict.  `above`, `below`: the numbers of the runs of each group.  `digits`: decimals of the
+    estimate.  `text`: format of the text; {} is the estimate.
+    """
     return text.format(ratio_estimate(above, below, digits)), decides(ratio_interval(above, below), least, most)
 
 
 def about(span: tuple[float, float], least: float, most: float, stronger_below: bool) -> Holds:
-    """Judge an effect of a published size by its interval (low, high); "stronger" beyond the bounds on the side of a larger effect."""
+    """Judge by its interval `span` (low, high) whether an effect has the published size, from `least` to `most`.
+
+    True within these bounds, False outside, None if the interval contains a bound; "stronger" if it lies outside where the effect is
+    larger: below `least` with `stronger_below`, else above `most`.
+    """
     found = decides(span, least, most)
     is_stronger = span[1] < least if stronger_below else span[0] > most
     return "stronger" if found is False and is_stronger else found
 
 
 def equivalent(first: ArrayLike, second: ArrayLike, margin: float) -> bool | None:
-    """Return whether the means of two groups differ by less than a margin: two one-sided tests, by the interval of the difference."""
+    """Return whether the interquartile means of two groups differ by less than `margin`, by the interval of their difference.
+
+    True if the whole interval lies within [-margin, margin] (two one-sided tests), False if it lies outside, None if it contains a bound.
+    """
     return decides(difference_interval(first, second), -margin, margin)
 
 
 def is_above(first: ArrayLike, second: ArrayLike) -> bool | None:
-    """Return whether the mean of the first group is above that of the second, and False if the difference is 0 in all resamples.
+    """Return whether the interquartile mean of the first group is above that of the second, by the interval of the difference.
 
-    None if only a part of the interval of the difference is above 0.
+    True if the whole interval is above 0, False if no part of it is, None if only a part is.
     """
     return _sign(difference_interval(first, second))
 
 
 def stands_above(values: Mapping[Key, ArrayLike], name: Key, least: float = -np.inf) -> bool | None:
-    """Return whether the mean of one group is above those of all others, and above `least`."""
+    """Return whether the interquartile mean of the group `name` is above those of all other groups, and above `least`; None: open.
+
+    `values`: the numbers of the runs of each group, by its key.
+    """
     apart = [is_above(values[name], group) for key, group in values.items() if key != name]
     return all_hold([*apart, *([decides(interval(values[name]), least=least)] if least > -np.inf else [])])
 
 
 def stands_below(values: Mapping[Key, ArrayLike], name: Key) -> bool | None:
-    """Return whether the mean of one group is below those of all others."""
+    """Return whether the interquartile mean of the group `name` is below those of all other groups; None: open.
+
+    `values`: the numbers of the runs of each group, by its key.
+    """
     return all_hold(is_above(group, values[name]) for key, group in values.items() if key != name)
 
 
 def better(values: Mapping[str, ArrayLike], name: str, rivals: Sequence[str], worse: bool = False, digits: int = 2) -> Decided:
-    """Judge whether the runs of one group are above those of every rival (or, with `worse`, below them).
+    """Judge whether the runs of the group `name` are above those of every rival, or with `worse` below; returns text and verdict.
 
-    They are above a rival if the interval of the probability of improvement lies above one half.  They are not if it lies below, or if the
-    groups are equivalent: the interval of the ratio lies within a tenth of 1.
+    `values`: the numbers of the runs of each group, by its key.  The runs are above a rival's if the interval of the probability of
+    improvement lies above one half.  They are not above if this interval lies below one half, or if both groups are equivalent: the
+    interval of the ratio of their means lies within 0.9 to 1.1.
     """
     parts, verdicts = [f"{name} {estimate(values[name], digits)}"], list[bool | None]()
     for rival in rivals:
@@ -136,7 +162,10 @@ def _about_equal(first: ArrayLike, second: ArrayLike) -> bool:
 
 
 def rises(change: ArrayLike) -> bool | None:
-    """Return whether the change of the runs is above 0; False if it is 0 in all runs, None if only a part of its interval is above 0."""
+    """Return whether the interquartile mean of `change`, a number of each run, is above 0, by its interval.
+
+    True if the whole interval is above 0, False if no part of it is, None if only a part is.
+    """
     return _sign(interval(change))
 
 
@@ -146,5 +175,8 @@ def _sign(span: tuple[float, float]) -> bool | None:
 
 
 def changes(before: Array, after: Array) -> str:
-    """Return the means before and after and the mean change of a run as text."""
+    """Return as text the interquartile means before and after a change, and the mean of the change with its 95 % interval.
+
+    `before`, `after`: (N,), a number of each run.
+    """
     return f"from {interquartile_mean(before):.2f} to {interquartile_mean(after):.2f}, by {estimate(after - before)}"

@@ -24,7 +24,10 @@ CONFIG, VERSIONS, RESULTS = "config.json", "versions.json", "results.json"
 
 
 def new_run(runs: Path, name: str, options: Mapping[str, Any]) -> Path:
-    """Make `runs/<time>-<name>/` with config.json and versions.json; raises OSError."""
+    """Make the folder `runs`/<time>-<name> of a new run, with config.json and versions.json, and return it; raises OSError.
+
+    `name`: of the experiment.  `options`: of the run, by name.
+    """
     runs.mkdir(parents=True, exist_ok=True)
     stamp = time.strftime("%Y%m%d-%H%M%S")
     number = 1
@@ -41,13 +44,13 @@ def new_run(runs: Path, name: str, options: Mapping[str, Any]) -> Path:
 
 
 def discard_unused(folder: Path) -> None:
-    """Remove the folder of a run that was refused before it wrote any result."""
+    """Remove the folder of a run, if it has only config.json, versions.json and empty files: the run wrote no result."""
     if all(path.name in (CONFIG, VERSIONS) or (path.is_file() and path.stat().st_size == 0) for path in folder.iterdir()):
         shutil.rmtree(folder)
 
 
 def experiment_of(folder: Path) -> str:
-    """Return the name of a run's experiment; raises InvalidValue if the folder is not that of a run."""
+    """Return the name of the experiment of a run; raises InvalidValue if `folder` is not the folder of a run."""
     return _begun(folder)[0]
 
 
@@ -61,7 +64,7 @@ def _begun(folder: Path) -> tuple[str, dict[str, Any]]:
 
 
 def options_of(folder: Path, name: str) -> dict[str, Any]:
-    """Return the options with which a run was begun; raises InvalidValue if it is a run of another experiment."""
+    """Return the recorded options of a run, by name; raises InvalidValue if it is not a run of the experiment `name`."""
     begun, options = _begun(folder)
     if current_name(begun) != current_name(name):
         raise InvalidValue(f"{folder} is a run of {begun!r}, not of {name!r}.")
@@ -69,14 +72,17 @@ def options_of(folder: Path, name: str) -> dict[str, Any]:
 
 
 def keep_options(folder: Path, name: str, options: Mapping[str, Any]) -> None:
-    """Write the options with which a run continues, if they differ from the recorded ones."""
+    """Write the options with which a run of the experiment `name` continues into config.json, if they differ from the recorded ones."""
     if options_of(folder, name) != json.loads(json.dumps(options, default=str)):
         write(folder / CONFIG, {"experiment": name, "options": dict(options)})
 
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Lock a run against other processes; raises InvalidValue if another one holds it, OSError if config.json cannot be opened."""
+    """Lock the folder of a run against other processes for the duration of a `with` statement; without effect on Windows.
+
+    Raises InvalidValue if another process holds the lock, OSError if config.json cannot be opened.
+    """
     with (folder / CONFIG).open("r+") as config:
         _lock(config.fileno(), folder)
         yield  # unlocked when the file is closed, at the latest when the process ends
@@ -96,7 +102,7 @@ def _lock(config: int, folder: Path) -> None:
 
 
 def newest_run(runs: Path, name: str) -> Path:
-    """Return the folder of the newest run of an experiment; raises InvalidValue if there is none."""
+    """Return the folder of the newest run of an experiment in the folder `runs`; raises InvalidValue if there is none."""
     runs_of_it = re.compile(rf"(\d{{8}}-\d{{6}})-(?:{'|'.join(map(re.escape, all_names(name)))})(?:-(\d+))?")
     found = {path.parent: match.groups() for path in runs.glob(f"*/{CONFIG}") if (match := runs_of_it.fullmatch(path.parent.name))}
     if not found:
@@ -105,7 +111,7 @@ def newest_run(runs: Path, name: str) -> Path:
 
 
 def given_run(folder: Path, runs: Path, name: str) -> Path:
-    """Return `folder` if it exists; raises InvalidValue that names the newest run."""
+    """Return `folder` if it is a folder; otherwise raises InvalidValue with a message that names the experiment's newest run in `runs`."""
     if folder.is_dir():
         return folder
     try:
@@ -116,12 +122,12 @@ def given_run(folder: Path, runs: Path, name: str) -> Path:
 
 
 def write(path: Path, content: Mapping[str, Any]) -> None:
-    """Write a file of indented JSON."""
+    """Write `content` as indented JSON to a file; values that JSON does not have are written as text."""
     path.write_text(json.dumps(content, indent=2, default=str) + "\n")
 
 
 def read(path: Path) -> dict[str, Any]:
-    """Read a file written by `write`; raises InvalidValue if it is missing or damaged."""
+    """Return the content of a JSON file, as `write` writes it; raises InvalidValue if the file is missing or damaged."""
     try:
         return dict(json.loads(path.read_text()))
     except (OSError, ValueError, TypeError):

@@ -25,7 +25,7 @@ Statistic = Callable[[Array], Array]  # of values along the last axis
 Run = TypeVar("Run")
 Found = TypeVar("Found")
 RATES = (0.05, 0.04, 0.03, 0.02, 0.01, 0.005, 0.002, 0.001)
-"""Error rates of intervals at which a decision is repeated; a bootstrap of RESAMPLES does not resolve smaller ones."""
+"""Error rates of intervals at which a decision is repeated; smaller ones cannot be resolved by a bootstrap of RESAMPLES (2000) samples."""
 MIN_RATE = RATES[-1]
 
 
@@ -52,22 +52,22 @@ def _deciding_at(level: float, samples: dict[tuple[object, ...], Array]) -> Iter
 
 
 def decision_level() -> float:
-    """Return the level of the intervals that decide: LEVEL, or what `error_rate` asks for."""
+    """Return the level of the intervals that decide: LEVEL (0.95), or within `error_rate` the level that it tries."""
     made = _decisions.get(_Decisions())
     made.used = True
     return made.level
 
 
 def level_of_each(looks: int) -> float:
-    """Return the level of each interval for a claim that holds as soon as one of `looks` comparisons does (Bonferroni)."""
+    """Return the level of each interval for a claim that holds as soon as one of `looks` comparisons holds (Bonferroni)."""
     return 1.0 - (1.0 - decision_level()) / looks
 
 
 def error_rate(decide: Callable[[], Found], key: Callable[[Found], object] = lambda found: found) -> tuple[Found, float | None]:
-    """Return what `decide` finds with 95 % intervals, and the smallest of RATES for its intervals at which its `key` is the same.
+    """Return the result of `decide` with 95 % intervals, and the smallest error rate of the intervals at which the result is the same.
 
-    This rate is a p value of the decision, rounded up to RATES: of several intervals that must all decide, the largest counts.  None if
-    `decide` computes no interval.
+    The rate is one of RATES, and a p value of the decision, rounded up: if several intervals must all decide, the largest of their p
+    values.  It is None if `decide` computes no interval.  `key`: results with equal keys count as the same.
     """
     samples: dict[tuple[object, ...], Array] = {}  # intervals of all levels are quantiles of the same samples
 
@@ -87,12 +87,12 @@ def error_rate(decide: Callable[[], Found], key: Callable[[Found], object] = lam
 
 
 def interquartile_mean(values: ArrayLike) -> float:
-    """Return the mean of values (n,) without the lowest and the highest quarter, each rounded down; n is at least 1."""
+    """Return the mean of values (n,) without the lowest and the highest quarter of them, each n // 4 values; n is at least 1."""
     return float(interquartile_means(_checked(values)))
 
 
 def interquartile_means(values: Array) -> Array:
-    """Return the interquartile means along the last axis of (..., n)."""
+    """Return the interquartile means of values (..., n) along the last axis, shape (...)."""
     ordered = np.sort(values, axis=-1)
     cut = values.shape[-1] // 4
     found: Array = ordered[..., cut : values.shape[-1] - cut].mean(axis=-1)
@@ -100,7 +100,7 @@ def interquartile_means(values: Array) -> Array:
 
 
 def mean_over(runs: Sequence[Run], number: Callable[[Run], float]) -> float:
-    """Return the interquartile mean of a number computed for each run."""
+    """Return the interquartile mean of the numbers that the function `number` computes from each run."""
     return interquartile_mean([number(run) for run in runs])
 
 
@@ -112,15 +112,15 @@ def interval(
     resamples: int = RESAMPLES,
     level: float | None = None,
 ) -> tuple[float, float]:
-    """Return the interval of a statistic by the stratified percentile bootstrap.
+    """Return the interval (low, high) of a statistic by the stratified percentile bootstrap.
 
     Args:
         values: (n,).
-        statistic: applied to resamples (resamples, n) along the last axis; each value is drawn from the stratum of its place.
-        strata: (n,) labels; values are drawn anew within each label.  None: one stratum.
+        statistic: function of bootstrap samples (resamples, n) that computes a number of each sample, along the last axis.
+        strata: (n,) labels: each value of a sample is drawn from the values with the label of its place; None: from all values.
         seed: of the bootstrap.
         resamples: number of bootstrap samples.
-        level: of the interval; None: that of intervals that decide, 95 % unless `error_rate` asks for another.
+        level: confidence level, 0 to 1; None: that of the intervals that decide, 0.95 unless `error_rate` tries another one.
     """
     given = _checked(values)
     labels = np.zeros(len(given)) if strata is None else np.asarray(strata)
@@ -147,7 +147,7 @@ def _sampled(values: Array, statistic: Statistic, labels: Array, seed: int, resa
 
 
 def estimate(values: ArrayLike, digits: int = 2) -> str:
-    """Return the interquartile mean and its 95 % interval as text."""
+    """Return the interquartile mean of values (n,) and its 95 % interval as text, as "0.50 [0.41, 0.62]"; `digits`: decimals."""
     low, high = interval(values, level=LEVEL)
     return f"{interquartile_mean(values):.{digits}f} [{low:.{digits}f}, {high:.{digits}f}]"
 
@@ -166,17 +166,24 @@ def _drawn(strata: bytes, resamples: int, seed: int) -> Ints:
 
 
 def ratio(above: ArrayLike, below: ArrayLike) -> float:
-    """Return the ratio of the interquartile means of two groups of runs."""
+    """Return the interquartile mean of the values `above` (n,) divided by that of the values `below` (m,)."""
     return interquartile_mean(above) / interquartile_mean(below)
 
 
 def ratio_interval(above: ArrayLike, below: ArrayLike, level: float | None = None) -> tuple[float, float]:
-    """Return the bootstrap interval of `ratio`; both groups are resampled.  `level`: as in `interval`."""
+    """Return the bootstrap interval (low, high) of `ratio`; both groups are resampled.
+
+    `level`: confidence level, 0 to 1; None: that of the intervals that decide, 0.95 unless `error_rate` tries another one.
+    """
     return _of_both(above, below, _ratios, level)
 
 
 def difference_interval(first: ArrayLike, second: ArrayLike, level: float | None = None) -> tuple[float, float]:
-    """Return the bootstrap interval of the difference of the interquartile means of two groups; both are resampled."""
+    """Return the bootstrap interval (low, high) of the interquartile mean of `first` (n,) minus that of `second` (m,).
+
+    Both groups are resampled.  `level`: confidence level, 0 to 1; None: that of the intervals that decide, 0.95 unless `error_rate` tries
+    another one.
+    """
     return _of_both(first, second, _differences, level)
 
 
@@ -189,18 +196,21 @@ def _differences(first: Array, second: Array) -> Array:
 
 
 def ratio_estimate(above: ArrayLike, below: ArrayLike, digits: int = 2) -> str:
-    """Return `ratio` and its 95 % interval as text."""
+    """Return the `ratio` of two groups and its 95 % interval as text, as "1.50 [1.20, 1.90]"; `digits`: decimals."""
     low, high = ratio_interval(above, below, LEVEL)
     return f"{ratio(above, below):.{digits}f} [{low:.{digits}f}, {high:.{digits}f}]"
 
 
 def probability_of_improvement(first: ArrayLike, second: ArrayLike) -> float:
-    """Return the probability that a run of the first group is above one of the second; ties count half (Mann-Whitney U / nm)."""
+    """Return the probability that a value of `first` (n,) is above one of `second` (m,); ties count half (Mann-Whitney U / nm)."""
     return float(_improvements(_checked(first), _checked(second)))
 
 
 def improvement_interval(first: ArrayLike, second: ArrayLike, level: float | None = None) -> tuple[float, float]:
-    """Return the bootstrap interval of `probability_of_improvement`; both groups are resampled.  `level`: as in `interval`."""
+    """Return the bootstrap interval (low, high) of `probability_of_improvement`; both groups are resampled.
+
+    `level`: confidence level, 0 to 1; None: that of the intervals that decide, 0.95 unless `error_rate` tries another one.
+    """
     return _of_both(first, second, _improvements, level)
 
 
@@ -224,14 +234,17 @@ def _of_both(first: ArrayLike, second: ArrayLike, compare: Callable[[Array, Arra
 
 
 def chi_squared(share: float, freedom: int) -> float:
-    """Return the number below which a share of the chi-squared distribution with `freedom` degrees of freedom lies."""
+    """Return the quantile of the chi-squared distribution with `freedom` degrees of freedom below which the share `share` lies."""
     from scipy.special import gammaincinv
 
     return float(2.0 * gammaincinv(0.5 * freedom, share))
 
 
 def share_interval(successes: int, tries: int, level: float | None = None) -> tuple[float, float]:
-    """Return the interval of a share of successes (Wilson 1927); `level`: as in `interval`.  Tries must be independent."""
+    """Return the interval (low, high) of a share of successes in independent tries (Wilson 1927).
+
+    `level`: confidence level, 0 to 1; None: that of the intervals that decide, 0.95 unless `error_rate` tries another one.
+    """
     from scipy.stats import binomtest  # a second, and only shares need it
 
     given = binomtest(successes, tries).proportion_ci(decision_level() if level is None else level, method="wilson")
@@ -239,7 +252,7 @@ def share_interval(successes: int, tries: int, level: float | None = None) -> tu
 
 
 def relative_spread(counts: ArrayLike) -> float:
-    """Return the standard deviation over the mean; 0 if all numbers are equal."""
+    """Return the standard deviation of the numbers divided by their mean; 0 if all numbers are equal."""
     given = np.asarray(counts, dtype=np.float64)
     return float(given.std() / given.mean())
 

@@ -12,10 +12,13 @@ T = TypeVar("T")
 
 
 def encoded(record: Any, indent: int | None = None) -> str:
-    """Return a Struct, or a list of them, as JSON text; numbers that are not finite are written as Python's json module writes them."""
+    """Return a msgspec Struct, or a list of Structs, as JSON text; numbers that are not finite are written as Infinity, -Infinity or NaN.
+
+    `indent`: spaces for each level; None: all in one line.
+    """
     return json.dumps(msgspec.to_builtins(record), indent=indent)
 
 
 def decoded(text: str, kind: type[T]) -> T:
-    """Return what `encoded` has written; raises msgspec.ValidationError for a text of another kind."""
+    """Return the object of type `kind` that `encoded` has written as `text`; raises msgspec.ValidationError for another type."""
     return msgspec.convert(json.loads(text), type=kind)

@@ -30,14 +30,14 @@ MAX_LISTED = 3  # failed cells that are named in the message; the folder has all
 
 
 class CellsFailed(MobeeError):
-    """Raised at the end of a sweep in which cells failed; the others are finished and on disk."""
+    """Raised at the end of a sweep in which cells failed; all other cells are finished and on disk."""
 
 
 class Condition(NamedTuple):
     """One setting of a sweep, under which a trial is run with each seed.
 
-    `name`: unique in its sweep and safe as a file name.  `settings`: JSON values.  `cost`: expected duration of a trial relative to
-    the others, in any unit.  `seeds`: seeds of this condition, if they are not those of the run.
+    `name`: unique in its sweep and safe as a file's name.  `settings`: JSON values by name.  `cost`: expected duration of a trial relative
+    to the others, in any unit.  `seeds`: seeds of this condition; (): those of the run.
     """
 
     name: str
@@ -52,34 +52,37 @@ Run = TypeVar("Run")
 
 
 def grid(**settings: Sequence[Any]) -> list[Condition]:
-    """Return a condition for each combination of the settings; the last one varies fastest."""
+    """Return a condition for each combination of the values of the settings; the last setting varies fastest.
+
+    `settings`: the values of each setting, by its name.
+    """
     return [Condition("-".join(map(str, values)), dict(zip(settings, values, strict=True))) for values in product(*settings.values())]
 
 
 def no_options(parser: argparse.ArgumentParser) -> None:
-    """Add no options."""
+    """Add no options: the default of `Sweep.add_options`."""
 
 
 def no_requirement() -> None:
-    """Require no optional package."""
+    """Require no optional package: the default of `Sweep.require`."""
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """A method: one trial under each condition with each seed.
+    """A `Method` of an experiment: one trial under each condition with each seed.
 
     Args:
-        conditions: computes the conditions from the options, among them the bool `quick`.
-        trial: runs one cell, given the settings of its condition and a seed; returns JSON values and arrays, which depend on these
-            two alone.  It must be a function of a module, so that other processes can import it.
-        findings: computes the results from the finished cells, which are sorted by name.
-        plot: draws the finished cells; returns a matplotlib Figure, see experiments.kit.plots.
-        seeds: default of --seeds.
-        add_options: adds the options of the experiment.
-        require: called before the first trial; raises MobeeError if an optional package that the trials need is absent.
-        kept: glob patterns of the files that are the record of a run.
-        summary: reduces the values of a cell to those from which `findings` and `plot` compute, where all values of a run are too large for
-            its record; both get its result.
+        conditions: function that computes the conditions from the options of the run, among them the bool `quick`.
+        trial: function that runs one cell, given the settings of its condition and a seed; returns JSON values and arrays by name, which
+            depend on these two alone.  It must be a function of a module, so that other processes can import it.
+        findings: function that computes the results from the finished cells, by cell name, sorted.
+        plot: function that draws the finished cells and returns a Matplotlib Figure, as made by experiments.kit.plots.
+        seeds: default of the option --seeds.
+        add_options: function that adds the options of the experiment to a parser.
+        require: function that is called before the first trial; raises MobeeError if an optional package that the trials need is absent.
+        kept: glob patterns of the files that are the raw record of a run.
+        summary: function that reduces the values of a cell to those from which `findings` and `plot` compute, for runs whose values are too
+            large for the raw record; `findings` and `plot` get the reduced values.  None: the values are not reduced.
     """
 
     conditions: Callable[[argparse.Namespace], Iterable[Condition]]
@@ -93,25 +96,25 @@ class Sweep:
     summary: Callable[[dict[str, Any]], dict[str, Any]] | None = None
 
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
-        """Add the options of all sweeps and those of the experiment."""
+        """Add the options that all sweeps have, and those of the experiment, to the parser."""
         sweep_arguments(parser, self.seeds)
         self.add_options(parser)
 
     def cells(self, arguments: argparse.Namespace) -> list[Cell]:
-        """Return the cells: every condition with every seed."""
+        """Return the cells of a run with these options: every condition with every seed."""
         seeds = range(arguments.seed, arguments.seed + arguments.seeds)
         return [
             Cell(f"{one.name}-s{seed}", seed, one.settings, one.cost) for one in self.conditions(arguments) for seed in one.seeds or seeds
         ]
 
     def run(self, arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-        """Run the cells that are not in the folder yet; returns the findings."""
+        """Run the cells that are not in the folder of the run yet, and return the results that `findings` computes from all cells."""
         self.require()
         run_cells(partial(_run_trial, self.trial), self.cells(arguments), folder, arguments)
         return self.results(folder)
 
     def results(self, folder: Path) -> dict[str, Any]:
-        """Compute the findings from the finished cells."""
+        """Return the results that `findings` computes from the finished cells in the folder of a run."""
         return self.findings(self._loaded(folder))
 
     def _loaded(self, folder: Path) -> dict[str, CellResult]:
@@ -119,11 +122,11 @@ class Sweep:
         return found if self.summary is None else {name: _summarised(one, self.summary) for name, one in found.items()}
 
     def recorded(self, folder: Path) -> AbstractContextManager[Path]:
-        """Return the folder with the `kept` files of a run; with a `summary` a temporary one with the reduced cells."""
+        """Return a context manager that yields the folder of the run, or with a `summary` a temporary folder with the reduced cells."""
         return nullcontext(folder) if self.summary is None else reduced_cells(folder, partial(_reduced, self.summary))
 
     def figure(self, folder: Path) -> Path:
-        """Draw the finished cells; raises InvalidValue if there are none."""
+        """Draw the finished cells in the folder of a run, and return the path of the picture; raises InvalidValue if there are none."""
         found = self._loaded(folder)
         if not found:
             raise InvalidValue(f"{folder} has no finished cells: the run was stopped before the first.")
@@ -150,19 +153,29 @@ def _run_trial(trial: Trial, cell: Cell) -> dict[str, Any]:
 
 
 def grouped(found: Cells, setting: str, order: Sequence[Any]) -> dict[Any, list[dict[str, Any]]]:
-    """Group the values of the finished cells by a setting, in the given order of its values; each group is sorted by seed."""
+    """Return the values of the finished cells in groups: a list sorted by seed for each value of one setting.
+
+    `found`: the cells by name.  `setting`: name of the setting.  `order`: its values, in the order of the groups; a value without finished
+    cells is left out.
+    """
     cells = sorted(found.values(), key=lambda result: result.cell.seed)
     groups = {value: [one.values for one in cells if one.cell.settings[setting] == value] for value in order}
     return {value: values for value, values in groups.items() if values}
 
 
 def grouped_by(found: Cells, *settings: str) -> dict[tuple[Any, ...], list[dict[str, Any]]]:
-    """Group the values of the finished cells by the values of several settings; each group is sorted by seed."""
+    """Return the values of the finished cells in groups: a list sorted by seed for each combination of values of the named settings.
+
+    The key of a group is the tuple of these values.
+    """
     return runs_by(found, lambda result: result.values, *settings)
 
 
 def runs_by(found: Cells, of: Callable[[CellResult], Run], *settings: str) -> dict[tuple[Any, ...], list[Run]]:
-    """Group the results of `of` for the finished cells, as `grouped_by` does."""
+    """Return what the function `of` computes from each finished cell in groups: a list sorted by seed for each combination of settings.
+
+    The key of a group is the tuple of the values of the named settings.
+    """
     groups: dict[tuple[Any, ...], list[Run]] = {}
     for result in sorted(found.values(), key=lambda result: result.cell.seed):
         groups.setdefault(tuple(result.cell.settings[setting] for setting in settings), []).append(of(result))
@@ -172,13 +185,14 @@ def runs_by(found: Cells, of: Callable[[CellResult], Run], *settings: str) -> di
 def run_cells(work: Work, cells: Sequence[Cell], folder: Path, arguments: argparse.Namespace) -> None:
     """Run the cells that are not in `folder` yet; each is written to disk as soon as it is finished.
 
-    `work` must be a function of a module, so that other processes can import it; it returns a dict of JSON values and arrays, which
-    depend on its cell alone.  A kill loses at most the cells that are running.  With the option --track, what is learned in a cell and
-    the numbers that it returns are written as event files too.
+    `work`: function of a module, so that other processes can import it; returns a dict of JSON values and arrays, which depend on its cell
+    alone.  `arguments`: the options `jobs`, `engine` and `track`.  If the program is killed, only the unfinished cells are lost.  With the
+    option --track, the transitions that agents learn in a cell and the numbers that it returns are written as event files for TensorBoard,
+    too.
 
     Raises:
-        InvalidValue: two cells have one name, or the folder holds a cell of that name with other settings.
-        CellsFailed: with the names of the first; the errors are in `folder`/cells/<name>.failed.txt.
+        InvalidValue: two cells have the same name, or the folder has a cell of this name with other settings.
+        CellsFailed: cells failed; the message names the first ones, and the errors are in `folder`/cells/<name>.failed.txt.
     """
     _require_distinct(cells)
     left = _unfinished(cells, folder)
@@ -248,7 +262,7 @@ ENGINES = ("processes", "ray")
 
 
 def sweep_arguments(parser: argparse.ArgumentParser, seeds: int = 10) -> None:
-    """Add --seeds, --jobs, --engine and --quick."""
+    """Add the options --seeds (default: `seeds`), --jobs, --engine and --quick to the parser."""
     parser.add_argument(
         "--seeds", type=positive_whole, default=seeds, metavar="N", help=f"repetitions with different seeds (default: {seeds})"
     )
@@ -259,24 +273,27 @@ def sweep_arguments(parser: argparse.ArgumentParser, seeds: int = 10) -> None:
 
 
 class TimeLeft:
-    """Predicts the remaining time from the costs of cells: of all cells, and of those `left` at the time `start` [s]."""
+    """Predicts the remaining time of a sweep from the costs of its cells and the time that the finished ones took.
+
+    `everything`: costs of all cells.  `left`: costs of the cells that are not finished at the time `start` [s].
+    """
 
     def __init__(self, everything: Sequence[float], left: Sequence[float], start: float) -> None:
         self._all, self._left, self._start = sum(everything), sum(left), start
         self._done, self._now = 0.0, start
 
     def finished(self, cost: float, now: float) -> None:
-        """Record that a cell has finished at the time `now` [s]."""
+        """Record that a cell of this cost has finished at the time `now` [s]."""
         self._done, self._now = self._done + cost, now
 
     @property
     def fraction(self) -> float:
-        """The finished share of all costs, including cells of earlier runs."""
+        """The cost of the finished cells, including those of earlier runs, divided by the cost of all cells; 0 to 1."""
         return 1.0 - (self._left - self._done) / self._all if self._all else 1.0
 
     @property
     def seconds(self) -> float:
-        """The remaining time [s] at the average speed so far."""
+        """The predicted remaining time [s] at the average speed so far; infinite before a cell has finished."""
         return (self._left - self._done) * (self._now - self._start) / self._done if self._done else float("inf")
 
     def __str__(self) -> str:

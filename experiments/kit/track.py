@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Writes what agents learn, transition by transition, and the numbers of trials as event files for TensorBoard.
 
-Each agent and each trial has a folder of its own below `tensorboard/`, which is a run in TensorBoard.  Steps are transitions.
+Each agent and each trial has its own folder below `tensorboard/`, which is one run in TensorBoard.  The steps of the curves are
+transitions.
 """
 
 from __future__ import annotations
@@ -29,19 +30,19 @@ _FLUSH = 10  # s
 
 
 def add_track(parser: argparse.ArgumentParser) -> None:
-    """Add the option --track."""
+    """Add the option --track to the parser."""
     text = "write what agents learn as event files, into a folder `tensorboard` (extra `track`)"
     parser.add_argument("--track", choices=TRACKERS, help=text)
 
 
 def require_tracker(name: str | None) -> None:
-    """Raise NotInstalled if a tracker is asked for whose package is absent."""
+    """Raise NotInstalled if the option --track has a value (`name` is not None) and the package tensorboardX is not installed."""
     if name is not None and importlib.util.find_spec("tensorboardX") is None:
         raise NotInstalled('--track tensorboard needs the package tensorboardX, which is not installed: pip install "mobee[track]"')
 
 
 class Scalars:
-    """The event file of one run of TensorBoard; a new file hides the earlier ones in its folder."""
+    """Writes the event file of one run of TensorBoard into `folder`; TensorBoard then ignores earlier event files of this folder."""
 
     def __init__(self, folder: Path) -> None:
         from tensorboardX import SummaryWriter
@@ -49,7 +50,7 @@ class Scalars:
         self._writer = SummaryWriter(str(folder), flush_secs=_FLUSH, purge_step=0)
 
     def write(self, step: int, time: float | None = None, **values: float) -> None:
-        """Write values at a step; `time`: s, None: now."""
+        """Write numbers at a step, each with its name; `time`: wall-clock time, s since 1970; None: now."""
         for name, value in values.items():
             self._writer.add_scalar(name, value, step, time)
 
@@ -59,22 +60,22 @@ class Scalars:
 
 
 class LearningCurves:
-    """The curves of one agent, from its transitions.
+    """Writes the curves of one agent, computed from its transitions, into an event file.
 
-    reward: information gain [nats]; surprise: -ln of the probability that it gave to the outcome [nats]; tried: share of its
-    state-actions that were tried; predictable: share of them that were tried at least twice and ended alike in at least 80 % of the
-    tries; robot_time: duration of all actions [s].
+    The curves are: reward: information gain [nats]; surprise: -ln of the probability that the agent gave to the outcome [nats]; tried:
+    share of its state-actions that were tried; predictable: share of its state-actions that were tried at least twice and had the same
+    outcome in at least 80 % of the tries; robot_time: total duration of all actions [s].
     """
 
     def __init__(self, scalars: Scalars, space: Space, model: TransitionModel) -> None:
-        """`model`: without observations, with the settings of the agent's model."""
+        """`model`: a new transition model without observations, with the settings of the agent's model; the curves are computed with it."""
         self._scalars, self._model, self._every = scalars, model, space.state_actions
         self._outcomes: dict[tuple[int, int], Counter[int]] = {}
         self._predictable: set[tuple[int, int]] = set()
         self._seconds = 0.0
 
     def add(self, made: Transition, time: float | None = None) -> None:
-        """Add a transition; `time`: s at which it was made, None: now."""
+        """Add the next transition of the agent; `time`: wall-clock time at which it was made, s since 1970; None: now."""
         surprise = surprise_of(probability_of(self._model, made.s, made.a, made.s_next))
         self._model.observe(made.s, made.a, made.s_next)
         self._seconds += made.duration
@@ -87,15 +88,15 @@ class LearningCurves:
         self._scalars.write(made.n, time, reward=made.reward, surprise=surprise, robot_time=self._seconds, **shares)
 
     def close(self) -> None:
-        """Close the file."""
+        """Write the remaining numbers, and close the event file."""
         self._scalars.close()
 
 
 @contextmanager
 def tracked(folder: Path) -> Iterator[None]:
-    """Write the curves of all agents that learn in this process within the context, each into a folder with the name of its part.
+    """Write the curves of all agents that learn in this process during a `with` statement, each into `folder`/<name of its part>.
 
-    A second `tracked` within the first replaces it until it ends.
+    An inner `tracked` replaces the outer one until it ends.
     """
     curves: dict[CuriousLearner, LearningCurves] = {}
     parts = Counter[str]()
@@ -117,7 +118,7 @@ def tracked(folder: Path) -> Iterator[None]:
 
 
 def track_values(values: Mapping[str, Any], folder: Path) -> None:
-    """Write the numbers among the values of a trial; those that are no numbers are left out."""
+    """Write the numbers among the values of a trial (values by name) as an event file in `folder`; other values are ignored."""
     numbers = {name: float(value) for name, value in values.items() if isinstance(value, int | float)}
     if numbers:
         scalars = Scalars(folder)
@@ -126,9 +127,9 @@ def track_values(values: Mapping[str, Any], folder: Path) -> None:
 
 
 def track_stores(run: Path, robot: Robot | None = None) -> None:
-    """Write the curves of the agents whose transitions are in files below the folder of a run, as those of live systems.
+    """Write the curves of the agents whose transitions are in SQLite stores below the folder of a run, such as those of a live system.
 
-    `robot`: that of the agents; None: the shipped robot with the recorded name.
+    The event files are below `run`/tensorboard.  `robot`: the agents' robot; None: the shipped robot with the recorded name.
     """
     for file in sorted(run.rglob(STORE)):
         with TransitionStore(file, "", read_only=True) as store:

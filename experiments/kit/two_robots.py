@@ -17,10 +17,10 @@ from mobee.robot.urdf.shapes import grown
 from mobee.vision.teaching.postures import Carried
 
 ICUB, KATANA = ("torso", "head", "left_arm", "right_arm"), ("katana_arm", "katana_hand")
-"""The parts of both robots."""
+"""The names of the parts of each robot, as in the joined robot."""
 BASE = np.array([-0.5, 0.4, 0.106])  # m: of the Katana, as in icub_katana.xml
 BALL = Carried("katana_arm_4", BASE + np.array([-0.386, 0.0, -0.01]))
-"""At the tips of the closed fingers."""
+"""The ball that the Katana carries, at the tips of its closed fingers."""
 WIDTH = 0.06  # m, of the Katana's fields against the iCub: the widest of those that `derive` makes
 CLOSED = 0.2  # rad, of the Katana's hand from its limit
 SIDEWAYS = {"shoulder_pitch": -2.0, "shoulder_roll": 65.0, "elbow": 28.0}  # degrees: arms out of the shared workspace
@@ -28,10 +28,10 @@ SIDEWAYS = {"shoulder_pitch": -2.0, "shoulder_roll": 65.0, "elbow": 28.0}  # deg
 
 @cache
 def two_robots() -> Robot:
-    """Return both robots joined.
+    """Return the iCub and the Katana joined into one robot; names of the Katana begin with "katana_".
 
-    The file of the Katana has no fields.  It gets those that are derived for its own links, which are narrow since they would overlap
-    otherwise, and wider ones that are tested against the iCub's fields alone.
+    The file of the Katana has no fields.  The Katana gets narrow fields, which are tested against its own links; wide ones would overlap.
+    It also gets wide fields (6 cm), which are tested only against the iCub's fields.
     """
     icub, katana = load_robot("icub"), derive(load_robot("katana")).robot
     wide = [grown(solid, WIDTH, f"{solid.name}_wide_field") for solid in katana.shapes if solid.role == "solid" and solid.link > 0]
@@ -43,13 +43,13 @@ def two_robots() -> Robot:
 
 
 def motors_of(parts: tuple[str, ...]) -> slice:
-    """Return the motors of adjacent parts."""
+    """Return the slice of the motors of `parts` in the joined robot; the parts must be adjacent, in the order of the robot."""
     slices = [two_robots().part(part).slice for part in parts]
     return slice(slices[0].start, slices[-1].stop)
 
 
 def watching() -> Array:
-    """Return a posture (n,) rad in which the iCub's arms are aside and the Katana's hand is closed; the rest is at home."""
+    """Return the posture (n,) rad of both robots with the iCub's arms aside, the Katana's hand closed, and all other motors at home."""
     robot = two_robots()
     q: Array = robot.home.copy()
     for side in "lr":

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A plant around another one, the base of those that observe or falsify what an agent does."""
+"""A plant that passes all calls to another plant: the base class of plants that observe or falsify what an agent does."""
 
 from __future__ import annotations
 
@@ -13,28 +13,31 @@ P = TypeVar("P", bound=ReachPlant)
 
 
 class WrappedPlant(Generic[P]):
-    """A ReachPlant that does everything on its `inner` plant; a subclass changes some of the methods."""
+    """A `mobee.reach.ReachPlant` that passes every call to the plant `inner`; a subclass changes some of the methods."""
 
     def __init__(self, inner: P) -> None:
         self.inner, self.robot = inner, inner.robot
 
     @property
     def q(self) -> Array:
-        """See Plant."""
+        """The present encoder values of all motors of the inner plant, (n,) rad, in the order of `robot.motors`."""
         return self.inner.q
 
     def measure(self, part: str) -> Array:
-        """See Plant."""
+        """Return the present encoder values of the part's motors, (n_part,) rad, from the inner plant."""
         return self.inner.measure(part)
 
     def act(self, part: str, target: Array) -> Outcome:
-        """See Plant."""
+        """Perform the action on the inner plant: set the attractor to `target` (n_part,) rad and wait, as in `mobee.plant.Plant.act`."""
         return self.inner.act(part, target)
 
     def present(self, target: ReachTarget | None) -> None:
-        """See ReachPlant."""
+        """Put the target into the world of the inner plant, or move it there; None removes it, as in `mobee.reach.ReachPlant.present`."""
         self.inner.present(target)
 
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
-        """See ReachPlant."""
+        """Perform the reach on the inner plant: pull the marker to the presented target, as in `mobee.reach.ReachPlant.reach`.
+
+        `stay`: the part stays where the reach ended; otherwise its attractor pulls it back.
+        """
         return self.inner.reach(part, marker, stay)

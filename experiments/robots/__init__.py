@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Writes the shipped robot files from numbers."""
+"""Programs that write the shipped robot files from numbers."""

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Write services/robot_sim/solid_pairs.json: which pairs of links count as solid contact in the simulator.
 
-A pair is listed when the convex hulls of its links stay apart by 2 mm in 2000 random legal poses (joint limits and the
-robot's linear constraints): a pair that overlaps in some of them (shoulder and chest, forearm and hand) is no sign of a
-collision.  Hands and forearms against torso, head, table and the other arm are always listed: these are the contacts that
-the robot must avoid, and random poses hold many of them.
+A pair is listed if the convex hulls of its links stay apart by 2 mm in 2000 random legal poses (within the joint limits and the robot's
+linear constraints).  If a pair overlaps in some of these poses (shoulder and chest, forearm and hand), its contacts are no sign of a
+collision.  Hands and forearms against torso, head, table and the other arm are always listed: the robot must avoid these contacts, and they
+occur in many random poses.
 
 Run time: about 2 s.  Usage: python -m experiments.robots.solid_pairs
 """
@@ -31,7 +31,7 @@ ARM = ("shoulder_1", "shoulder_2", "shoulder_3", "upper_arm", "elbow_1", "forear
 
 
 def always() -> list[list[str]]:
-    """Return the pairs that are always listed: hands and forearms against torso, head, the other arm and the table."""
+    """Return the pairs of link names that are always listed: hands and forearms against torso, head, the other arm and the table."""
     pairs = set()
     for side, other in (("l", "r"), ("r", "l")):
         for link in (f"{side}_forearm", f"{side}_hand"):
@@ -41,7 +41,7 @@ def always() -> list[list[str]]:
 
 
 def legal_poses(robot: Robot, rng: np.random.Generator, count: int) -> list[Array]:
-    """Return poses, uniform within the limits, that satisfy every clause."""
+    """Return `count` random poses (n,) rad, uniform within the limits, that satisfy every clause."""
     lower, upper = robot.limits[:, 0], robot.limits[:, 1]
     poses: list[Array] = []
     while len(poses) < count:
@@ -52,7 +52,7 @@ def legal_poses(robot: Robot, rng: np.random.Generator, count: int) -> list[Arra
 
 
 def stay_apart(scene: BulletScene, pairs: list[list[str]], poses: list[Array]) -> list[list[str]]:
-    """Return the pairs whose hulls are apart in all poses."""
+    """Return which of the pairs of link names have hulls more than 2 mm apart in all poses; `poses`: (n,) rad each."""
     for q in poses:
         scene.set_posture(q)
         pairs = [pair for pair in pairs if scene.distance(pair[0], pair[1], MIN_DISTANCE) > MIN_DISTANCE]
@@ -60,7 +60,7 @@ def stay_apart(scene: BulletScene, pairs: list[list[str]], poses: list[Array]) -
 
 
 def main() -> None:
-    """Write the list."""
+    """Write solid_pairs.json, and print the numbers of pairs."""
     robot, world = load_robot("icub"), load_world("table")
     scene = BulletScene(robot, world, substep=0.005)
     solid = sorted(name for name in scene.links if not name.endswith("_dh_frame"))

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Write mobee/robot/robots/icub.xml, the iCub v2.5 upper body with 41 motors.
 
-Source: data models.icub_v2_5 (derived from robotology/icub-models, CC BY-SA 4.0), yarp_parts, shoulder_constraints.mobee_2014;
-fields are ours. The meshes that it draws are those of the installed icub-models.
+Source: data models.icub_v2_5 (derived from robotology/icub-models, CC BY-SA 4.0), yarp_parts, shoulder_constraints.mobee_2014; fields are
+ours.  The file names the meshes of the installed icub-models, which viewers draw.
+
 Usage: python -m experiments.robots.write_icub DATA.json [OUT.xml]
 """
 
@@ -71,7 +72,7 @@ FINGERS = {  # joints that each motor of a hand drives
 
 
 def main(data_path: str, out: str | Path = OUT) -> None:
-    """Write the file."""
+    """Write the robot file `out` from the JSON data at `data_path`."""
     data = json.loads(Path(data_path).read_text(encoding="utf-8"))
     model = data["models"]["icub_v2_5"]
     root = ET.Element("ZeroPositionKinematicTree", version=VERSION, robotName="icub")
@@ -88,7 +89,10 @@ def main(data_path: str, out: str | Path = OUT) -> None:
 
 
 def add_joints(parent: ET.Element, data: dict[str, Any], link: str, point: Array) -> None:
-    """Add the joints that are mounted on a link, with their children."""
+    """Add the joints that are mounted on the link `link`, with everything that they carry, to the XML element `parent`.
+
+    `data`: the JSON data.  `point`: (3,) m, root frame at zero pose, origin of `parent`.
+    """
     joints = [j for j in data["models"]["icub_v2_5"]["joints"] if RIGID.get(j["parent_link"], j["parent_link"]) == link]
     parts = ["torso", "head", "left_arm", "right_arm"]
     for joint in sorted(joints, key=lambda j: parts.index(j["body_part"])):
@@ -105,7 +109,10 @@ def add_joints(parent: ET.Element, data: dict[str, Any], link: str, point: Array
 
 
 def add_joint(parent: ET.Element, data: dict[str, Any], joint: dict[str, Any], point: Array) -> None:
-    """Add a joint and the displacement before it, with shapes, fields, markers and children."""
+    """Add a joint and the displacement before it, with shapes, fields, markers and children, to the XML element `parent`.
+
+    `data`: the JSON data.  `joint`: its entry in the data.  `point`: (3,) m, root frame at zero pose, origin of `parent`.
+    """
     axis = np.array(joint["axis_root"])
     here = skeleton_point(joint["name"], np.array(joint["point_root"]), axis)
     link, name = joint["child_link"], joint["name"].removesuffix("_joint")
@@ -138,7 +145,10 @@ def add_joint(parent: ET.Element, data: dict[str, Any], joint: dict[str, Any], p
 
 
 def skeleton_point(name: str, point: Array, axis: Array) -> Array:
-    """Return the point on a joint's axis that is nearest to the anchor of its group."""
+    """Return the point (3,) m on a joint's axis that is nearest to the anchor of its group in ANCHORS; without an anchor, `point` itself.
+
+    `name`: of the joint.  `point`, `axis`: (3,), a point and the direction of its axis, root frame at zero pose.
+    """
     plain = name.removeprefix("l_").removeprefix("r_")
     key = next((key for key in (plain, plain.split("_")[0]) if key in ANCHORS), None)
     if key is None:
@@ -148,7 +158,7 @@ def skeleton_point(name: str, point: Array, axis: Array) -> Array:
 
 
 def add_constraints(parent: ET.Element, data: dict[str, Any]) -> None:
-    """Add the cable and forearm clauses of an arm, as in MoBeE 2014."""
+    """Add the cable and forearm clauses of an arm, as in MoBeE 2014, to the XML element `parent` of the arm's part."""
     for clause in data["shoulder_constraints"]["mobee_2014"]["full_cnf_per_arm"]:
         rows = element(parent, "constraintList")
         for row in clause:
@@ -158,14 +168,17 @@ def add_constraints(parent: ET.Element, data: dict[str, Any]) -> None:
 
 
 def motor_of(joint: str) -> str:
-    """Return the motor that drives a joint; it has the joint's name, except in the hands."""
+    """Return the name of the motor that drives a joint: the joint's own name, except in the hands."""
     side, _, rest = joint.partition("_hand_")
     finger = next((motor for motor, joints in FINGERS.items() if rest in joints), None)
     return f"{side}_{finger}" if finger else joint
 
 
 def joint_interval(name: str, motor: str, limits: list[float]) -> tuple[float, float] | None:
-    """Return the range of the joint [deg]; None if it equals the range of its motor."""
+    """Return the range of a joint [deg], lowest and highest; None if it equals the range of its motor.
+
+    `limits`: range of the joint in the data, deg.
+    """
     finger = name.partition("_hand_")[2]
     if finger in SPREAD:
         return SPREAD[finger]
@@ -175,7 +188,10 @@ def joint_interval(name: str, motor: str, limits: list[float]) -> tuple[float, f
 
 
 def declare_motors(parent: ET.Element, data: dict[str, Any], part: str) -> None:
-    """Add a part's motors in YARP order; limits are the narrower of URDF and iCub simulator."""
+    """Add the motors of a part to the XML element `parent`, in YARP's order.
+
+    Their limits are those of the URDF or of the iCub simulator, whichever are narrower.
+    """
     parts = data["yarp_parts"]
     joints = {j["name"]: j for j in data["models"]["icub_v2_5"]["joints"]}
     simulator = parts["limits_deg"]["icub_simulator"]["arm" if part.endswith("arm") else part]
@@ -189,10 +205,10 @@ def declare_motors(parent: ET.Element, data: dict[str, Any], part: str) -> None:
 
 
 def add_mass(parent: ET.Element, joint: dict[str, Any], point: Array) -> None:
-    """Add the mass that moves with a joint, relative to a point.
+    """Add the mass that moves with a joint to the XML element `parent`; positions are written relative to `point` (3,) m, root frame.
 
-    Fingers and eyes are left out: 0.01 kg and 0.001 kg m^2 each are placeholders of the source. In its other model, which is simulated,
-    hand and head weigh the same without them.
+    Fingers and eyes are left out: their 0.01 kg and 0.001 kg m^2 each are placeholders of the source. In its other model, which is
+    simulated, hand and head have the same mass without them.
     """
     if "_hand_" in joint["name"] or "eye" in joint["name"]:
         return
@@ -202,7 +218,10 @@ def add_mass(parent: ET.Element, joint: dict[str, Any], point: Array) -> None:
 
 
 def add_shapes(parent: ET.Element, model: dict[str, Any], link: str, point: Array) -> None:
-    """Add the solids of a link, relative to a point."""
+    """Add the solids of a link to the XML element `parent`; positions are written relative to `point` (3,) m, root frame.
+
+    `model`: the robot in the data.
+    """
     for index, (low, high) in enumerate(np.array(BOXES.get(link, ())).reshape(-1, 2, 3)):
         width, height, depth = high - low
         place = vector("px py pz", (low + high) / 2 - point)
@@ -223,7 +242,7 @@ def add_shapes(parent: ET.Element, model: dict[str, Any], link: str, point: Arra
 
 
 def add_fields(parent: ET.Element, link: str, point: Array) -> None:
-    """Add the fields of a link, relative to a point."""
+    """Add the fields of a link to the XML element `parent`; positions are written relative to `point` (3,) m, root frame."""
     for name, host, radius, first, second in fields():
         if host != link:
             continue
@@ -239,17 +258,17 @@ def add_fields(parent: ET.Element, link: str, point: Array) -> None:
 
 
 def fields() -> list[Field]:
-    """Return the fields of all links, with the full names of the links."""
+    """Return the fields of all links: name, link, radius [m], and both ends (3,) m of the axis, in the root frame at zero pose."""
     mirror = [(n, k, r, (a[0], -a[1], a[2]), (b[0], -b[1], b[2])) for n, k, r, a, b in LEFT_ARM]
     arms = [(f"l_{n}", f"l_{k}", r, a, b) for n, k, r, a, b in LEFT_ARM] + [(f"r_{n}", f"r_{k}", r, a, b) for n, k, r, a, b in mirror]
     return TRUNK + HEAD + arms
 
 
 def add_visuals(parent: ET.Element, model: dict[str, Any], link: str, point: Array) -> None:
-    """Add the visuals of a link, with positions relative to `point`: the mesh that the URDF has for this link, or a hand's solids.
+    """Add the visuals of a link to the XML element `parent`: the mesh that the URDF has for this link, or for hands, their solids.
 
-    The link has the same zero pose in the URDF. The URDF's mesh of a hand cannot be used: palm and fingers are one piece, so the fingers
-    would not move.
+    Positions are written relative to `point` (3,) m, root frame; the link has the same zero pose in the URDF. The URDF's mesh of a hand
+    cannot be used: palm and fingers are one piece, so the fingers would not move.
     """
     if "hand" in link:
         for shape in model["primitives"]:
@@ -273,13 +292,13 @@ def add_visuals(parent: ET.Element, model: dict[str, Any], link: str, point: Arr
 
 @cache
 def drawn() -> Robot:
-    """Return the URDF of icub-models."""
+    """Return the robot that the URDF of icub-models describes; every call returns the same object."""
     with tempfile.TemporaryDirectory() as folder:
         return read_urdf(write_upper_body_urdf(Path(folder) / "icub.urdf"))
 
 
 def add_markers(parent: ET.Element, data: dict[str, Any], link: str, point: Array) -> None:
-    """Add the markers of a link, relative to a point."""
+    """Add the markers of a link to the XML element `parent`; positions are written relative to `point` (3,) m, root frame."""
     model = data["models"]["icub_v2_5"]
     palms = model["end_effector_zero_root"]
     for side, sign in (("left", -1.0), ("right", 1.0)):
@@ -296,7 +315,11 @@ def add_markers(parent: ET.Element, data: dict[str, Any], link: str, point: Arra
 
 
 def add_marker(parent: ET.Element, name: str, place: Array, rotation: Array, normal: Array) -> None:
-    """Add one marker."""
+    """Add one marker to the XML element `parent`.
+
+    `place`: (3,) m, relative to the origin of `parent`.  `rotation`: (3, 3), orientation of its frame.  `normal`: (3,); both in root axes
+    at zero pose.
+    """
     rows = " ".join(number(value) for value in rotation.ravel())
     element(parent, "marker", name=name, rotation=rows, **vector("px py pz", place), **vector("nx ny nz", normal))
 

@@ -32,7 +32,7 @@ LISTED_LENGTH = 1.0  # in the data, of an element that the file gives no length
 
 
 class Tree:
-    """Indices of the data of mobee_original."""
+    """The data of mobee_original with dicts for the search: nodes by id, motors by part, names and joints of motors, names of links."""
 
     def __init__(self, data: dict[str, Any]) -> None:
         model = data["mobee_original"]
@@ -46,12 +46,12 @@ class Tree:
         self.links = {joint["name"]: joint["child_link"] for joint in data["models"]["icub_v2_5"]["joints"]}
 
     def children(self, parent: int | None) -> list[dict[str, Any]]:
-        """Return the children of a node, part by part in the order of this library."""
+        """Return the children of the node with the id `parent` (None: the roots), part by part: torso, head, left arm, right arm."""
         mine = [node for node in self.nodes.values() if node["parent"] == parent]
         return sorted(mine, key=lambda node: PARTS.index(node["body_part"]))
 
     def joint_name(self, node: dict[str, Any]) -> str:
-        """Return the name of the joint's motor, with a number if it drives several joints, and with a side for the eyes."""
+        """Return the name of a joint: that of its motor, with a number if the motor drives several joints, and with a side for the eyes."""
         motor = self.axis[node["motor"]]
         joints = self.joints[motor]
         if motor.startswith("eyes"):
@@ -73,7 +73,7 @@ def main(data_path: str, out: str | Path = OUT) -> None:
 
 
 def declare_motors(parent: ET.Element, tree: Tree, part: str) -> None:
-    """Add the motors and linear constraints of a part."""
+    """Add the motors of a part, and for an arm its linear constraints, to the XML element `parent`."""
     for motor in tree.motors[part]:
         low, high, home = motor["min_deg"], motor["max_deg"], motor["home_deg"]
         element(parent, "motor", name=motor["yarp_axis"], minPos=low, maxPos=high, home=home)
@@ -82,7 +82,7 @@ def declare_motors(parent: ET.Element, tree: Tree, part: str) -> None:
 
 
 def add_node(parent: ET.Element, tree: Tree, node: dict[str, Any]) -> None:
-    """Add a link or joint with its shapes, its markers and its children."""
+    """Add a node of the data, a link or a joint, with its shapes, its markers and its children, to the XML element `parent`."""
     if node["parent"] is not None and tree.nodes[node["parent"]]["body_part"] != node["body_part"]:
         part = next((old for old in parent.findall("bodypart") if old.get("name") == node["body_part"]), None)
         if part is None:
@@ -119,7 +119,10 @@ def add_node(parent: ET.Element, tree: Tree, node: dict[str, Any]) -> None:
 
 
 def joint_element(parent: ET.Element, tree: Tree, node: dict[str, Any], axis: Array) -> ET.Element:
-    """Add a joint with its axis, motor and interval; its link has the name of icub.xml's where that has the link."""
+    """Add a joint with its axis (3,), motor and interval to the XML element `parent`, and return the new element.
+
+    The link that the joint moves has the name that icub.xml gives to the link of this joint, or "<joint>_link" if icub.xml has none.
+    """
     name, motor = tree.joint_name(node), tree.axis[node["motor"]]
     here = element(parent, "joint", name=name, moves=tree.links.get(name, f"{name}_link"), motor=motor, **vector("x y z", axis))
     low, high = node["joint_limits_deg"]
@@ -133,7 +136,11 @@ def joint_element(parent: ET.Element, tree: Tree, node: dict[str, Any], axis: Ar
 
 
 def end_point(tree: Tree, node: dict[str, Any]) -> Array:
-    """Return where a link ends: at its children's points, so that rounding does not add up along the tree."""
+    """Return the point (3,) m, root frame at zero pose, at which a link ends.
+
+    It is the point of a child of the link, so that rounding errors do not add up along the tree; without children, it follows from the
+    length.
+    """
     for child in tree.nodes.values():
         if child["parent"] == node["id"]:
             return np.array(child["point_root"])
@@ -142,7 +149,7 @@ def end_point(tree: Tree, node: dict[str, Any]) -> Array:
 
 
 def add_shape(parent: ET.Element, shape: dict[str, Any], point: Array) -> None:
-    """Add a sphere, cylinder or box, relative to a point."""
+    """Add a sphere, cylinder or box to the XML element `parent`; its position is written relative to `point` (3,) m, root frame."""
     attributes = vector("px py pz", np.array(shape["center_root"]) - point)
     if shape["role"] == "field":
         attributes["field"] = "true"

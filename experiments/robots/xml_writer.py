@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Common code of both writers: numbers, elements and box angles in the grammar of mobee/robot/robots/README.md."""
+"""Common code of both writers of robot files: numbers, elements and angles of boxes in the grammar of mobee/robot/robots/README.md."""
 
 from __future__ import annotations
 
@@ -14,25 +14,31 @@ from mobee.robot.xml.volume import Y, angle_about, height_and_angle
 
 
 def number(value: float, digits: int = 7) -> str:
-    """Return the shortest text of a number with at most `digits` decimals."""
+    """Return a number as the shortest text with at most `digits` decimals."""
     text = f"{value:.{digits}f}".rstrip("0").rstrip(".")
     return "0" if text in ("-0", "") else text
 
 
 def element(parent: ET.Element, tag: str, **attributes: str | float) -> ET.Element:
-    """Add a child element; numbers become text."""
+    """Add a child element with this tag and these attributes to `parent`, and return it; numbers become text."""
     texts = {name: value if isinstance(value, str) else number(value) for name, value in attributes.items()}
     return ET.SubElement(parent, tag, texts)
 
 
 def vector(names: str, values: Array, digits: int = 7) -> dict[str, str]:
-    """Return attributes such as px, py, pz for the components that are not zero."""
+    """Return XML attributes with the components of a vector that are not zero, by name.
+
+    `names`: of the components, separated by spaces, as "px py pz".  `values`: the components.  `digits`: largest number of decimals.
+    """
     texts = {name: number(value, digits) for name, value in zip(names.split(), values, strict=True)}
     return {name: text for name, text in texts.items() if text != "0"}
 
 
 def box_turn(rotation: Array) -> dict[str, str]:
-    """Return the attributes hx, hy, hz and angle [deg] of a box whose orientation is `rotation` (3, 3)."""
+    """Return the XML attributes hx, hy, hz (height axis) and angle [deg] of a box with the orientation `rotation` (3, 3), root frame.
+
+    Attributes with the default value are left out.
+    """
     left, _, right = np.linalg.svd(rotation)
     exact = left @ right
     axis, _ = height_and_angle(exact)
@@ -45,5 +51,5 @@ def box_turn(rotation: Array) -> dict[str, str]:
 
 
 def write(root: ET.Element, path: Path, heading: str) -> None:
-    """Write the indented file, with a comment that states its origin."""
+    """Write the XML tree indented to a file, with the comment `heading`, which states its origin."""
     write_tree(root, path, heading)

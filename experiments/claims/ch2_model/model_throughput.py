@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Model throughput: evaluations per second while a thread edits the world without a pause (thesis Algorithm 1, FLOOD_MODEL).
 
-Claim: while every joint moves and one thread removes and creates boxes as fast as it can, in growing numbers, the model gives
-consistent results hundreds of times per second for the iCub among hundreds of boxes, and more often for the Katana.  Source: thesis 2.4,
-figure 2.4.  Published: "hundreds of poses per second for a humanoid with hundreds of obstacles" on a dual-core 2.4 GHz laptop;
-the figure's curves are not given as numbers.  Run time: three to five minutes for the whole algorithm, 1000 numbers of
-objects with 1000 removals and creations each, for both robots.
+Claim: while every joint moves and one thread removes and creates boxes as fast as it can, in growing numbers, the model gives consistent
+results hundreds of times per second for the iCub among hundreds of boxes, and more often for the Katana.  Source: thesis 2.4, figure 2.4.
+Published: "hundreds of poses per second for a humanoid with hundreds of obstacles" on a dual-core 2.4 GHz laptop; the figure's curves are
+not given as numbers.  Run time: three to five minutes for the whole algorithm, 1000 numbers of objects with 1000 removals and creations
+each, for both robots.
 
-`--check` runs the endurance instead: several threads add, move, remove, attach, detach and change roles in one world while the
-model evaluates; no evaluation may see a half-made edit, nothing may raise, memory must stay constant.
+`--check` runs an endurance test instead: several threads add, move, remove, attach, detach and change roles in one world while the model
+evaluates; no evaluation may see a half-made edit, nothing may raise, memory must stay constant.
 """
 
 from __future__ import annotations
@@ -50,7 +50,11 @@ STATE_RATE = 100.0  # Hz, at which the iCub's motors report (thesis 2.3.2)
 
 
 class Record(TypedDict):
-    """Counts while the world held a number of objects."""
+    """Counts of one measurement with a constant number of objects in the world.
+
+    `robot`: "katana" or "icub".  `objects`: number of boxes.  `edits`: boxes removed plus boxes created meanwhile; 0: measured without
+    edits.  `seconds`: duration.  `evaluations`: of the model.
+    """
 
     robot: str
     objects: int
@@ -63,7 +67,7 @@ COLUMNS = tuple(Record.__annotations__)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
+    """Add the command-line options of this experiment to the parser."""
     parser.add_argument("--robots", nargs="+", choices=ROBOTS, default=list(ROBOTS), metavar="ROBOT", help=f"of {', '.join(ROBOTS)}")
     parser.add_argument("--objects", type=positive_whole, default=1000, metavar="N", help="largest number of boxes (default: 1000)")
     parser.add_argument("--edits", type=positive_whole, default=1000, metavar="N", help="replaced boxes at each number (default: 1000)")
@@ -73,7 +77,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Flood the model of each robot, or check its endurance."""
+    """Measure the throughput for each robot, from where the run in `folder` was stopped; with --check, run the endurance test instead.
+
+    Returns the results: those of `results` or of `model_throughput_endurance.endure`.
+    """
     if arguments.check:
         return endure(folder, threads=arguments.threads, duration=arguments.duration or ENDURANCE_SECONDS, seed=arguments.seed)
     give_up = time.monotonic() + arguments.duration if arguments.duration else float("inf")
@@ -97,7 +104,11 @@ def _line(record: Record) -> str:
 
 
 class Flood:
-    """Boxes in a world, of which random ones are replaced as fast as possible."""
+    """Boxes in a world; random ones of them are replaced as fast as possible.
+
+    `names`: names of the present boxes.  `robot`: short name of the robot, which selects where the boxes are.  `seed`: of their sizes and
+    positions, and of the choice.
+    """
 
     def __init__(self, world: World, robot: str, seed: int) -> None:
         self._world = world
@@ -107,11 +118,11 @@ class Flood:
         self.names: list[str] = []
 
     def create_object(self) -> None:
-        """Add a box."""
+        """Add one box to the world."""
         self.names.append(self._new())
 
     def replace_objects(self, times: int) -> None:
-        """Remove a random box and create a new one, `times` times."""
+        """Remove a random box and add a new one, `times` times."""
         for _ in range(times):
             place = self._choose(len(self.names))
             self._world.remove(self.names[place])
@@ -124,9 +135,10 @@ class Flood:
 
 
 def flood_model(robot: str, *, first: int, last: int, edits: int, seed: int, is_over: Callable[[], bool]) -> Iterator[Record]:
-    """Run FLOOD_MODEL from `first` to `last` objects with `edits` replacements at each number, and yield a record for each.
+    """Run FLOOD_MODEL (thesis Algorithm 1) and yield a record for each number of objects from `first` to `last`.
 
-    At each of NUMBERS a second record without edits follows.  Ends early when `is_over()`.
+    `robot`: "katana" or "icub".  `edits`: number of boxes that are replaced at each number.  After each of NUMBERS there is a second
+    record, without edits.  The run ends early when `is_over()` returns True.  An exception of a thread is raised here.
     """
     model = Model(load_robot(robot))
     flood = Flood(model.world, robot, seed)
@@ -160,13 +172,17 @@ class _Timer:
 
 
 def read_flood(path: Path) -> list[Record]:
-    """Read the records of a run."""
+    """Read the records of a run from its file; returns an empty list if there is no file."""
     types: dict[str, Any] = {"robot": str, "seconds": float}
     return [cast(Record, {name: types.get(name, int)(text) for name, text in row.items()}) for row in read_records(path, COLUMNS)]
 
 
 def results(records: list[Record], arguments: argparse.Namespace) -> dict[str, Any]:
-    """Return evaluations per second near some numbers of objects, with and without edits, and edits per second, for each robot."""
+    """Return the rates of each robot, and under "complete" whether all numbers of objects were measured.
+
+    For each robot: "evaluations_per_second_flooded" and "evaluations_per_second_still" (with and without edits), by number of objects;
+    "edits_per_second"; "objects_reached", the largest number.  `arguments`: the options of the run.
+    """
     found: dict[str, Any] = {}
     for robot in arguments.robots:
         mine = [record for record in records if record["robot"] == robot]
@@ -185,9 +201,11 @@ def results(records: list[Record], arguments: argparse.Namespace) -> dict[str, A
 
 
 def rates(records: Iterable[Record]) -> Iterator[tuple[int, int]]:
-    """Yield evaluations per second near each of NUMBERS that was reached, if all records together last MIN_SECONDS.
+    """Yield pairs of a number of objects and evaluations per second, near each of NUMBERS that was measured.
 
-    If the records near a number are too short, the next nearest are pooled with them, and their mean number is reported.
+    Records within 10 % of the number are pooled.  If they last less than MIN_SECONDS (0.2 s), the next nearest records are added; if the
+    mean number of objects then differs by more than 10 %, this mean is yielded instead of the number.  A number is left out if all records
+    together last less than MIN_SECONDS.
     """
     known = list(records)
     for number in NUMBERS:
@@ -204,9 +222,10 @@ def rates(records: Iterable[Record]) -> Iterator[tuple[int, int]]:
 
 
 def binned(records: Iterable[Record], seconds: float) -> Iterator[tuple[float, float]]:
-    """Yield mean number of objects and evaluations per second of groups of consecutive records of at least `seconds` each.
+    """Yield the mean number of objects and the evaluations per second of groups of records.
 
-    An incomplete last group is dropped.  If all records together are shorter, they form one group, unless below MIN_SECONDS.
+    A group has consecutive records that last at least `seconds` together.  An incomplete last group is dropped, except if it is the only
+    one.  Groups of less than MIN_SECONDS (0.2 s) are left out.
     """
     groups: list[list[Record]] = []
     for record in sorted(records, key=lambda r: r["objects"]):
@@ -230,7 +249,7 @@ def _point(group: Sequence[Record]) -> tuple[float, float]:
 
 
 def figure(folder: Path) -> Path:
-    """Draw the records of a run, or the course of an endurance run; raises InvalidValue if there are none."""
+    """Draw the records of the run in `folder`, or its endurance test, to a file.  Returns its path; raises InvalidValue without records."""
     endured, records = read_records(folder / ENDURANCE, ENDURANCE_COLUMNS), read_flood(folder / RECORDS)
     if not endured and not records:
         raise InvalidValue(f"{folder} has no records: the run was stopped before the first.")
@@ -238,7 +257,7 @@ def figure(folder: Path) -> Path:
 
 
 def plot(records: Sequence[Record]) -> Any:
-    """Draw evaluations per second against the number of objects, as in thesis figure 2.4."""
+    """Return a figure of evaluations per second over the number of objects, as in thesis figure 2.4."""
     drawing = new_figure(8.0, 5.0)
     axes = drawing.add_subplot()
     most = max(max(record["objects"] for record in records), 1)

@@ -52,9 +52,17 @@ MIN_SECONDS = 60.0  # s, shortest time for a slope
 
 
 class Editor:
-    """Edits its own objects, whose state it knows, so that no such edit may be refused, and objects shared by all threads.
+    """Edits a world at random from one thread: objects of its own, and objects that all threads share.
 
-    Two of its objects are witnesses of the order of edits: it always moves the first one by a step, then the second.
+    It knows the state of its own objects, so none of these edits may be refused.  `edits`: number of edits.  `refused`: number of refused
+    edits of shared objects, which are allowed.  Two of its objects are witnesses of the order of edits: the editor always moves the first
+    one by a step, then the second.
+
+    Args:
+        world, robot: the world to edit, and the robot to whose links objects are attached.
+        shipped: short name of the robot, which selects where the boxes are.
+        number: of the thread, from 0.
+        seed: of the random edits.
     """
 
     def __init__(self, world: World, robot: Robot, shipped: str, number: int, seed: int) -> None:
@@ -69,7 +77,7 @@ class Editor:
             world.add(name, box(0.05, 0.05, 0.05), position=self._witness_place())
 
     def edit(self) -> None:
-        """Make a random edit, or the two edits of the witnesses."""
+        """Make one random edit, or move both witnesses by a step."""
         kinds = (self._add, self._remove, self._move, self._role, self._attach, self._detach, self._step_witnesses, self._edit_shared)
         self._random.choices(kinds, weights=(4, 4, 8, 2, 1, 1, 4, 2))[0]()
         self.edits += 1
@@ -138,12 +146,16 @@ class Editor:
 
 
 def witnesses(number: int) -> tuple[str, str]:
-    """Return the names of the two objects that thread `number` moves one after the other."""
+    """Return the names of the two objects that thread `number` always moves one after the other."""
     return f"{number}:first", f"{number}:second"
 
 
 def out_of_order(objects: Mapping[str, WorldObject], threads: int) -> str | None:
-    """Return which thread's edits are seen in another order than they were made; None without such a thread."""
+    """Check that the edits of each thread are seen in the order in which they were made.
+
+    `objects`: a snapshot of the world, by name.  `threads`: number of threads.  Returns a text that names the first thread with wrong
+    order; None if all are right.
+    """
     for number in range(threads):
         first, second = (round(objects[name].position[0] / STEP) for name in witnesses(number))
         if (first - second) % STEPS > 1:
@@ -152,7 +164,10 @@ def out_of_order(objects: Mapping[str, WorldObject], threads: int) -> str | None
 
 
 class WatchedWorld(World):
-    """A world that remembers the last snapshot read: that of the newest evaluation, if only one thread evaluates."""
+    """A world that remembers the last snapshot that was read, in `seen`.
+
+    If only one thread evaluates the model, this is the snapshot of its newest evaluation.
+    """
 
     def __init__(self) -> None:
         super().__init__()
@@ -160,13 +175,16 @@ class WatchedWorld(World):
 
     @property
     def snapshot(self) -> Snapshot:
-        """See World.snapshot."""
+        """The present snapshot of the world, as in `World.snapshot`.  It is also stored in `seen`."""
         self.seen = super().snapshot
         return self.seen
 
 
 def torn_table(snapshot: Snapshot) -> str | None:
-    """Return how names, rows, roles or attached differ from the objects, which are boxes; None if they agree to the last bit."""
+    """Return a text that says how the tables of a snapshot differ from its objects; None if they agree exactly.
+
+    Compared are names, roles, the attached objects and the rows of volumes.  All objects must be boxes.
+    """
     things = list(snapshot.objects.values())
     if not snapshot.names == tuple(snapshot.objects) == tuple(thing.name for thing in things):
         return "names are not those of the objects"
@@ -194,7 +212,10 @@ def _rows_of_boxes(boxes: list[WorldObject]) -> Volumes:
 
 
 def other_objects(pose: Pose, snapshot: Snapshot) -> str | None:
-    """Return how the objects of an evaluation differ from those of its snapshot; None if they are the same."""
+    """Return a text that says how the objects of an evaluation differ from those of its snapshot; None if they are the same.
+
+    Objects that are attached to a link are not compared.
+    """
     seen = pose.objects
     if tuple(seen) != snapshot.names:
         return "the evaluation has other names than its snapshot"
@@ -203,13 +224,16 @@ def other_objects(pose: Pose, snapshot: Snapshot) -> str | None:
 
 
 class Reference:
-    """A reference model in whose world a single thread rebuilds the objects of a snapshot."""
+    """A second model of the robot, whose world a single thread rebuilds from a snapshot to check an evaluation."""
 
     def __init__(self, robot: Robot) -> None:
         self._model = Model(robot)
 
     def other_contacts(self, pose: Pose, snapshot: Snapshot) -> str | None:
-        """Return how the contacts of an evaluation differ from those of its rebuilt snapshot; None if they are the same."""
+        """Evaluate the same pose with a world that is rebuilt from the snapshot, and compare the contacts.
+
+        Returns a text that names the differing contacts; None if all depths agree within DEPTH_TOLERANCE (1e-9 m).
+        """
         world = self._model.world
         for name in world.objects:
             world.remove(name)
@@ -227,7 +251,7 @@ def _depths(pose: Pose) -> dict[tuple[str, str, str], float]:
 
 
 def resident_mb() -> float | None:
-    """Return the resident memory in MB; None where /proc is missing."""
+    """Return the resident memory of this process [MB]; None on systems without /proc."""
     try:
         with open("/proc/self/statm", encoding="ascii") as file:
             pages = int(file.read().split()[1])
@@ -237,9 +261,10 @@ def resident_mb() -> float | None:
 
 
 def slope_mb_per_minute(seconds: Sequence[float], megabytes: Sequence[float]) -> float | None:
-    """Return the slope of a line through the samples, MB/min, or None if they cover less than MIN_SECONDS.
+    """Fit a line to the samples of the memory and return its slope [MB/min].
 
-    The first WARM_UP share of the time is left out.  `seconds`: times of the samples since the start.
+    `seconds`: times of the samples since the start.  `megabytes`: the memory.  The first 20 % of the time (WARM_UP) is left out.  Returns
+    None if the remaining samples cover less than MIN_SECONDS (60 s).
     """
     settled = [(t / 60.0, mb) for t, mb in zip(seconds, megabytes, strict=True) if t > WARM_UP * seconds[-1]]
     if not settled or (settled[-1][0] - settled[0][0]) * 60.0 < MIN_SECONDS:
@@ -249,7 +274,11 @@ def slope_mb_per_minute(seconds: Sequence[float], megabytes: Sequence[float]) ->
 
 
 class Judge:
-    """Checks every evaluation in the thread that made it."""
+    """Checks every evaluation, in the thread that made it.
+
+    `torn`: number of occurrences of each error, by its text.  `references`: number of evaluations that were compared with a reference
+    model.
+    """
 
     def __init__(self, model: Model, world: WatchedWorld, threads: int) -> None:
         self.torn = Counter[str]()
@@ -259,7 +288,7 @@ class Judge:
         self._evaluations = self._version = 0
 
     def check(self, pose: Pose) -> None:
-        """Check an evaluation and count its errors."""
+        """Check an evaluation and count its errors in `torn`.  Every 50th (REFERENCE_PERIOD) is also compared with a reference model."""
         snapshot = self._world.seen
         self._evaluations += 1
         found = [torn_table(snapshot), other_objects(pose, snapshot), out_of_order(snapshot.objects, self._threads)]
@@ -273,7 +302,10 @@ class Judge:
 
 
 class Endurance:
-    """World, model, checks and editors of a run, with their counts."""
+    """An endurance run: the world, the moving model, the checks, and the editors of all threads.
+
+    `exceptions`: number of occurrences of each exception, by its traceback.  `samples`: pairs of time [s] and resident memory [MB].
+    """
 
     def __init__(self, threads: int, seed: int) -> None:
         self.world = WatchedWorld()
@@ -290,7 +322,7 @@ class Endurance:
 
     @contextmanager
     def running(self) -> Iterator[None]:
-        """Run all threads for the duration of this context."""
+        """Run all editing threads and the model inside this context manager."""
         end = threading.Event()
         crew = [threading.Thread(target=self._edit, args=(editor, end), daemon=True) for editor in self.editors]
         with fast_thread_switching(), self.moving:
@@ -306,7 +338,10 @@ class Endurance:
             self.exceptions["".join(traceback.format_exception(self.moving.error))] += 1
 
     def sample(self, seconds: float) -> dict[str, Any]:
-        """Return the current counts as a record."""
+        """Store the resident memory, and return the present counts as a dict with ENDURANCE_COLUMNS as keys.
+
+        `seconds`: time since the start.
+        """
         resident = resident_mb()
         if resident is not None:
             self.samples.append((seconds, resident))
@@ -315,7 +350,11 @@ class Endurance:
         return dict(zip(ENDURANCE_COLUMNS, (round(seconds, 3), *counts), strict=True))
 
     def verdict(self) -> dict[str, Any]:
-        """Return the results; `passed` if no evaluation was torn, nothing was raised and memory is constant."""
+        """Return the counts and results of the run.
+
+        "passed": whether no evaluation was torn, no exception was raised, and the memory grew by less than MAX_SLOPE (0.5 MB/min).
+        "slope_mb_per_minute": None if the run was too short.
+        """
         slope = slope_mb_per_minute(*zip(*self.samples, strict=True)) if self.samples else None
         is_sound = not self.judge.torn and not self.exceptions and self.moving.evaluations > 0
         return {
@@ -341,7 +380,10 @@ class Endurance:
 
 
 def endure(folder: Path, *, threads: int, duration: float, seed: int) -> dict[str, Any]:
-    """Let `threads` threads edit for `duration` s with a record per second in endurance.csv; returns the verdict."""
+    """Run the endurance test with `threads` editing threads for `duration` s, and return `Endurance.verdict` and the duration.
+
+    A record per second is written to endurance.csv in `folder`.
+    """
     path = folder / ENDURANCE
     path.unlink(missing_ok=True)  # an interrupted endurance run starts again
     run = Endurance(threads, seed)
@@ -357,7 +399,7 @@ def endure(folder: Path, *, threads: int, duration: float, seed: int) -> dict[st
 
 
 def plot_endurance(records: Sequence[Mapping[str, str]]) -> Any:
-    """Draw resident memory and the total edits and evaluations over time."""
+    """Return a figure of the resident memory, and of the total numbers of edits and evaluations, over time."""
     drawing = new_figure(8.0, 5.0)
     above, below = drawing.subplots(2, 1, sharex=True)
     minutes = [float(record["seconds"]) / 60.0 for record in records]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The threads of thesis figure 2.3 beside the sensory one, of which one moves every joint and one evaluates the model; and random boxes."""
+"""Two threads of thesis figure 2.3: one moves every joint and one evaluates the model.  Also random boxes."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ MIDDLE = {"icub": (-0.5, 0.0, 0.1), "katana": (0.0, 0.0, 0.0)}
 
 
 class Oscillator:
-    """A d-dimensional oscillator that drives every motor through its whole range."""
+    """Moves every motor sinusoidally through its whole range, each with its own random frequency (0.1 to 0.5 Hz) and phase."""
 
     def __init__(self, robot: Robot, rng: np.random.Generator) -> None:
         low, high = robot.limits.T
@@ -40,15 +40,16 @@ class Oscillator:
         self._phase = rng.uniform(0.0, 2.0 * np.pi, len(low))
 
     def at(self, t: float) -> Array:
-        """Return the posture (n,) rad at t [s]."""
+        """Return the positions of all motors (n,) rad at time `t` [s]."""
         posture: Array = self._middle + self._amplitude * np.sin(self._rate * t + self._phase)
         return posture
 
 
 class MovingModel:
-    """In its context, one thread moves the robot and another evaluates the model; `check` raises their exceptions.
+    """A context manager in which one thread moves the robot and another evaluates the model without a pause.
 
-    `watch` is called in the model's thread with every pose.
+    `watch` is called in the evaluating thread with every pose.  `evaluations`: number so far.  `error`: the exception that has ended a
+    thread, or None.
     """
 
     def __init__(self, model: Model, oscillator: Oscillator, watch: Callable[[Pose], None] = lambda _: None) -> None:
@@ -70,7 +71,7 @@ class MovingModel:
             thread.join()
 
     def check(self) -> None:
-        """Raise the exception that has ended a thread, if any."""
+        """Raise the exception that has ended one of the threads; return if there is none."""
         if self.error is not None:
             raise self.error
 
@@ -97,7 +98,7 @@ class MovingModel:
 
 @contextmanager
 def fast_thread_switching() -> Iterator[None]:
-    """Let Python threads switch every SWITCH_INTERVAL seconds in this context."""
+    """Let the threads of Python switch every SWITCH_INTERVAL (50 us) in this context manager, not every 5 ms."""
     before = sys.getswitchinterval()
     sys.setswitchinterval(SWITCH_INTERVAL)
     try:
@@ -108,7 +109,10 @@ def fast_thread_switching() -> Iterator[None]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Box:
-    """Arguments of `World.add`."""
+    """A box and its pose, as `World.add` takes them.
+
+    `position` (3,) m and `rotation` (3, 3), root frame.
+    """
 
     shape: Geometry
     position: Array  # (3,) m
@@ -116,7 +120,10 @@ class Box:
 
 
 def random_boxes(rng: np.random.Generator, robot: str, count: int) -> list[Box]:
-    """Return boxes of random size, position in the cube, and orientation."""
+    """Return `count` boxes of random size, orientation and position.
+
+    The edges are 2 to 10 cm long.  The centres are in a cube of 1 m within reach of the robot; `robot`: "icub" or "katana".
+    """
     middle = np.array(MIDDLE[robot])
     boxes = []
     for _ in range(count):

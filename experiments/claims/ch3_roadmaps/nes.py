@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """NES: number of evaluations that natural evolution strategies need, compared with CMA-ES.
 
-Claim: NES is in many ways comparable to CMA, and outperforms CMA on some tasks.  Source: thesis 3.1.  Published: no numbers here.
-Run time: 3 minutes on 2 cores.
+Claim: NES is in many ways comparable to CMA, and outperforms CMA on some tasks.  Source: thesis 3.1.  Published: no numbers here.  Run
+time: 3 minutes on 2 cores.
 
 A task is a function (sphere, ellipsoid and cigar of condition 1e6, Rosenbrock) of 10, 20 or 41 dimensions, rotated; each run has its own
 rotation and its own start in [-1, 1], the same for all strategies, and standard deviation 0.5.  The evaluations until f < 1e-8 are counted;
 a run that does not reach this counts as 400 000.  Strategies: xNES and SNES as published (Glasmachers 2010, Schaul 2011), the library's
 default (xNES with CMA-ES's path, weights and rates), and CMA-ES by its author, all with their default populations.  "Outperforms on some
-tasks": fewer on one of the twelve or more, by intervals at a twelfth of the error rate; "comparable": at most 1.5 times as many, median of
-the tasks.
+tasks": fewer evaluations on at least one of the twelve tasks, by confidence intervals with a twelfth of the error rate each (Bonferroni).
+"Comparable": at most 1.5 times as many evaluations, median of the tasks.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ Runs = Mapping[tuple[str, Task], Array]  # evaluations (seeds,) of every strateg
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return every strategy on every task; --quick: 10 dimensions and 20 000 evaluations."""
+    """Return the conditions of the sweep: every strategy on every task.  With --quick: 10 dimensions and at most 20 000 evaluations."""
     dimensions, most = (DIMENSIONS[:1], QUICK_MAX_EVALUATIONS) if arguments.quick else (DIMENSIONS, MAX_EVALUATIONS)
     return [
         Condition(
@@ -57,26 +57,33 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Run one search."""
+    """Run one search with this seed.
+
+    Keys: "evaluations", the number needed, at most `settings["most"]`; "found", whether the minimum was found; "us", own processor time of
+    the strategy per evaluation [us].
+    """
     most = settings["most"]
     evaluations, us = search(settings["strategy"], settings["function"], settings["dimensions"], seed, most)
     return {"evaluations": min(evaluations, most), "found": evaluations <= most, "us": us}
 
 
 def evaluations(found: Cells) -> Runs:
-    """Return the evaluations of every strategy and task, (seeds,), in the order of the seeds."""
+    """Return the evaluations of all seeds (seeds,), in the order of the seeds, by strategy and task (function, dimensions)."""
     by_condition = runs_by(found, lambda result: float(result.values["evaluations"]), "strategy", "function", "dimensions")
     return {(key[0], (key[1], key[2])): np.array(values) for key, values in by_condition.items()}
 
 
 def are_complete(runs: Runs) -> bool:
-    """Return whether every strategy has run on every task with equally many seeds."""
+    """Whether every strategy has run on every task, all with equally many seeds."""
     everything = list(product(STRATEGIES, product(FUNCTIONS, DIMENSIONS)))
     return all(key in runs for key in everything) and len({len(runs[key]) for key in everything}) == 1
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return a row for each task, and the claims."""
+    """Return the results of the sweep.
+
+    Keys: "evaluations", by task and strategy, as text; "found", the share of successful runs, by strategy; "claims", the judged claims.
+    """
     runs = evaluations(found)
     return {
         "evaluations": {
@@ -89,7 +96,7 @@ def findings(found: Cells) -> dict[str, Any]:
 
 
 def tasks(runs: Runs) -> list[Task]:
-    """Return the tasks that have runs, in the order of the functions."""
+    """Return the tasks (function, dimensions) that have runs, in the order of FUNCTIONS and DIMENSIONS."""
     return [(function, d) for function in FUNCTIONS for d in DIMENSIONS if any(task == (function, d) for _, task in runs)]
 
 
@@ -152,7 +159,7 @@ def _share(found: Cells, strategy: str) -> str:
 
 
 def plot(found: Cells) -> Any:
-    """Draw evaluations against dimensions, a panel for each function: interquartile means and 95 % intervals."""
+    """Return a figure of evaluations over dimensions, a panel for each function: interquartile means and 95 % intervals."""
     runs = evaluations(found)
     drawing = new_figure(12.0, 3.4)
     for axes, function in zip(drawing.subplots(1, len(FUNCTIONS), sharey=True), FUNCTIONS, strict=True):

@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """NGIK: number of evaluations of natural gradient inverse kinematics, compared with other optimisers.
 
-Claim: NES outperforms the other optimisation approaches at solving inverse kinematics for the iCub's 41 motors.
-Source: thesis 3.1.1.  Published: no numbers.  Run time: 3 minutes on 2 cores.
+Claim: NES outperforms the other optimisation approaches at solving inverse kinematics for the iCub's 41 motors.  Source: thesis 3.1.1.
+Published: no numbers.  Run time: 3 minutes on 2 cores.
 
-The right palm must reach its poses (place and rotation) in random postures among 100 boxes: 5 mm, 5 degrees, no contact; all 41 motors may
-move, or torso and arm, 10.  All have the same cost; each ends at its first good pose, restarts by its own criterion if it is stuck, and
-gives up after 20 000 evaluations.  NES as in `solve_ik(method="nes")`; xNES as published (Glasmachers 2010); CMA-ES (package cma, a
-generation at once); simulated annealing; a particle filter.  The evaluations per target are counted, including targets without success:
-"outperforms" means fewer than the rival.  Each seed has its own targets.  Times are processor time of one core.
+The targets are poses (position and rotation) of the right palm in random postures among 100 boxes; a solution is within 5 mm and 5 degrees
+and has no contact.  Either all 41 motors may move, or the 10 of torso and arm.  All solvers have the same cost.  Each ends at its first
+good pose, restarts by its own criterion if it makes no progress, and stops without success after 20 000 evaluations.  NES as in
+`solve_ik(method="nes")`; xNES as published (Glasmachers 2010); CMA-ES (package cma, a generation at once); simulated annealing; a particle
+filter.  The evaluations per target are counted, including targets without success: "outperforms" means fewer than the rival.  Each seed has
+its own targets.  Times are processor time of one core.
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ MIN_SHOWN, TICKS = 100, (100, 300, 1000, 3000, 10_000, MAX_EVALUATIONS)  # evalu
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return every solver with either number of motors; --quick: two targets per seed."""
+    """Return the conditions of the sweep: every solver with 41 and with 10 motors.  With --quick: two targets per seed."""
     count = QUICK_TARGETS if arguments.quick else TARGETS
     return [
         Condition(f"{name}-{motors}", {"solver": name, "motors": motors, "targets": count}, motors)
@@ -57,7 +58,10 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Solve the targets of a seed one after another."""
+    """Solve the targets of this seed one after another.
+
+    Keys: "reached", "evaluations" and "ms" (processor time), each (targets,).
+    """
     model, name, count = _model(), settings["solver"], settings["targets"]
     motors = MOTORS if settings["motors"] == FEW else None
     solve: Solve = library(model, "nes", motors) if name == NES else rival(model, RIVALS[name], motors)
@@ -74,7 +78,10 @@ def _model() -> Model:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solver:
-    """Results of one solver and one number of motors: means over the targets of a seed, (seeds,)."""
+    """Results of one solver with one number of motors: means over the targets of each seed, (seeds,).
+
+    `reached`: share of the targets.  `evaluations`: number per target.  `ms`: processor time per target.
+    """
 
     reached: Array
     evaluations: Array
@@ -88,14 +95,17 @@ Solvers = Mapping[tuple[str, int], Solver]  # by solver and number of motors
 
 
 def solvers(found: Cells) -> Solvers:
-    """Return the results by solver and number of motors, in the order of the seeds."""
+    """Return the results by solver and number of motors; within each, the values are in the order of the seeds."""
     groups = grouped_by(found, "solver", "motors")
     columns = ("reached", "evaluations", "ms")
     return {key: Solver(*(np.array([float(run[name].mean()) for run in runs]) for name in columns)) for key, runs in groups.items()}
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return a row for each solver and number of motors, and the claims."""
+    """Return the results of the sweep.
+
+    Keys: "solvers", a line of text for each solver and number of motors; "claims", the judged claims.
+    """
     known = solvers(found)
     rows = {f"{name}, {motors} motors": str(solver) for (name, motors), solver in sorted(known.items())}
     return {"solvers": rows, "claims": judged(CLAIMS, known)}
@@ -125,7 +135,7 @@ CLAIMS = (
 
 
 def plot(found: Cells) -> Any:
-    """Draw the share of targets reached against evaluations, a panel for each number of motors."""
+    """Return a figure of the share of targets reached over the number of evaluations, a panel for each number of motors."""
     drawing = new_figure(10.5, 3.6)
     for axes, motors in zip(drawing.subplots(1, 2, sharey=True), (WHOLE, FEW), strict=True):
         for number, (name, label) in enumerate({NES: OURS[NES], **RIVALS}.items()):

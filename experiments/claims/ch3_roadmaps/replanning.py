@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Replanning: the time to a new path when a ball becomes solid in front of the moving hand.
 
-Claim: when the ball is made solid, "the planner/controller immediately finds the alternative path around it".  Source: thesis 4.3.2,
-fig. 4.7.  Published: no number; aim of this reproduction: the new path under way within 200 ms of the bump, live, on robot_sim's clock.
-Run time: 6 minutes on 2 cores, in real time.
+Claim: when the ball is made solid, "the planner/controller immediately finds the alternative path around it".  Source: thesis 4.3.2, fig.
+4.7.  Published: no number; aim of this reproduction: the new path under way within 200 ms of the bump, live, on robot_sim's clock.  Run
+time: 6 minutes on 2 cores, in real time.
 
 The map has three poses of the right arm of `icub`, at the right of a ball, at its left, and above it; the path from right to left is
-shorter through the ball than over it.  The real processes with PyBullet (with --backend mujoco MuJoCo), in free mode, ticks of 10 ms, the
-default law at full speed. Each crossing begins with a new map; 0.1 to 1.2 s after its start the ball becomes an obstacle in the model, and
-a body in the simulator.  Bump: the first tick at which the model reports contact of the arm with the ball, fields included; the motion ends
-there, the edge is removed, and the arm moves on to the next vertex of the new path at once.  Under way: the first tick in which a command
-computed after the new goal is in force.  Also measured: when the joints stop approaching the old goal, which depends on the law.
+shorter through the ball than over it.  The real processes run with PyBullet (with --backend mujoco: MuJoCo), in free mode, with ticks of 10
+ms and the default law at full speed.  Each crossing begins with a new map; 0.1 to 1.2 s after its start the ball becomes an obstacle in the
+model, and a body in the simulator.  Bump: the first tick at which the model reports contact of the arm with the ball, fields included; the
+motion ends there, the edge is removed, and the arm moves on to the next vertex of the new path at once.  Under way: the first tick in which
+a command computed after the new goal is in force.  Also measured: when the joints stop approaching the old goal, which depends on the law.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ DEEP = 2e-3  # m
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
+    """Add the command-line options of this experiment to the parser."""
     add_backend(parser)
     parser.add_argument("--crossings", type=positive_whole, default=20, metavar="N", help="number of crossings (default: 20)")
     parser.add_argument("--lockstep", action="store_true", help="in lockstep instead of real time: the same result on any machine")
@@ -75,7 +75,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Make the crossings that are not in the folder yet."""
+    """Make the crossings that are not in `folder` yet, in launches of five, and return the results of all crossings."""
     count = QUICK_CROSSINGS if arguments.quick else arguments.crossings
     after = np.random.default_rng([arguments.seed, 432]).uniform(SOONEST, LATEST, count)
     pieces = [after[i : i + PIECE].tolist() for i in range(0, len(after), PIECE)]
@@ -93,12 +93,15 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 def results(folder: Path) -> dict[str, Any]:
-    """Compute the findings from the measured crossings."""
+    """Compute the results, as of `findings`, from the measured crossings in `folder`; raises InvalidValue if there are none."""
     return findings(_crossings(folder))
 
 
 def cross(folder: Path, job: Job, seed: int, lockstep: bool = False, backend: str = PHYSICS[0]) -> dict[str, Any]:
-    """Launch a system that makes the crossings of a job, recorded in the folder; returns its summary.  Raises LaunchFailed."""
+    """Launch a system that makes and records the crossings of a job in `folder`.  Returns the summary of the run; raises LaunchFailed.
+
+    `backend`: physics engine, "pybullet" or "mujoco".
+    """
     write_job(folder, job)
     names = {"world": str(WORLD), "simulated": str(SIMULATED), "backend": backend}
     seconds = LONGEST * (1 + len(job.after))
@@ -113,7 +116,14 @@ def _crossings(folder: Path) -> list[Measures]:
 
 
 class Measures(Struct, frozen=True):
-    """Measures of a crossing."""
+    """Measurements of one crossing.
+
+    `bumped`: whether the arm touched the ball on the short path.  `command`: time [ms] from the bump until the first command computed after
+    the new goal is in force.  `turn`: time [ms] from the bump until the joints stop approaching the old goal.  Both are -1 without a bump.
+    `on`: vertices to which the arm moved, in order.  `arrived`: whether the arm reached the other side.  `seconds`: duration.  `deepest`:
+    depth [m] of the deepest solid contact with the ball, by the simulator.  `thinking`: processor time [ms] from the end of the failed
+    motion to the request of the next.
+    """
 
     bumped: bool  # the arm touched the ball on the short path
     command: float  # ms from the bump to the first command in force that was formed after the new goal
@@ -126,7 +136,7 @@ class Measures(Struct, frozen=True):
 
 
 def measure(folder: Path) -> list[Measures]:
-    """Measure the crossings of a launch, and write the measures into its folder."""
+    """Compute the measures of all crossings of a launch from its recording, and write them into its folder."""
     q = read_positions(folder, robot())
     touches = [touch for touch in read_touches(folder / CONTACTS, 1.0 / RATE) if BALL in touch.pair]
     found = []
@@ -139,12 +149,15 @@ def measure(folder: Path) -> list[Measures]:
 
 
 def read_measured(folder: Path) -> list[Measures]:
-    """Read the measures written by `measure`."""
+    """Read the measures that `measure` wrote into the folder of a launch."""
     return decoded((folder / MEASURED).read_text(), list[Measures])
 
 
 def keep_poses(folder: Path) -> None:
-    """Save poses of the first crossing for pictures: `q` (T, n) rad, `times` (T,) s, and the times [s] of `solid` and `bump`."""
+    """Save poses of the first crossing of a launch for pictures, in poses.npz of its folder.
+
+    It contains `q` (T, n) rad, `times` (T,) s, and the times [s] `solid` (the ball becomes solid) and `bump` (the arm touches it).
+    """
     q, crossing = read_positions(folder, robot()), read_done(folder, Crossing)[0]
     ticks = np.arange(crossing.motions[0].asked, crossing.motions[-1].ended, EVERY)
     solid, bump = ((tick - ticks[0]) / RATE for tick in (crossing.solid, _bump(crossing)))
@@ -176,7 +189,10 @@ def _turned(q: Array, bump: int, vertex: int, ended: int) -> int:
 
 
 def findings(crossings: Sequence[Measures]) -> dict[str, Any]:
-    """Return the numbers and the measured claims."""
+    """Return the results.
+
+    Keys: "live", the numbers of all crossings: counts, and medians and maxima of the times [ms]; "claims", the judged claims.
+    """
     bumped = [one for one in crossings if one.bumped]
     row: dict[str, Any] = {"crossings": len(crossings), "with_a_bump": len(bumped), "arrived": sum(one.arrived for one in crossings)}
     if bumped:
@@ -224,7 +240,10 @@ CLAIMS = (around, soon, harmless)
 
 
 def figure(folder: Path) -> Path:
-    """Draw two rows of pictures as in thesis figure 4.7, through the ball and around it; the times go into a second file."""
+    """Draw two rows of pictures as in thesis figure 4.7, through the ball and around it, and the times in a second file.
+
+    `folder`: of the run.  Returns the path of the pictures.
+    """
     plot_times(_crossings(folder)).savefig(folder / "replanning-times.png", dpi=110)
     kept = np.load(next(path for path in sorted(folder.glob("launch-*")) if (path / POSES).exists()) / POSES)
     solid, bump = float(kept["solid"]), float(kept["bump"])
@@ -263,7 +282,10 @@ def _motion(q: Array, times: Array, solid: float) -> Motion:
 
 
 def plot_times(crossings: Sequence[Measures]) -> Any:
-    """Draw the distribution of the times from the bump to the new path."""
+    """Return a figure of the distributions of two times [ms] after the bump.
+
+    They are the time until a command of the new path is in force, and until the joints stop approaching the old goal.
+    """
     drawing = new_figure(6.0, 3.4)
     axes = drawing.subplots()
     for name, label in (("command", "a command of the new path is in force"), ("turn", "the joints stop approaching the old goal")):

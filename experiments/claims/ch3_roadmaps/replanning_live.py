@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The crossings of `replanning` on the live robot: the scene, a map of three poses around a ball, and a performer."""
+"""The crossings of the experiment `replanning` on the live robot: the scene, a map of three poses around a ball, and the performer."""
 
 from __future__ import annotations
 
@@ -41,12 +41,12 @@ RATE, SPEED = 100.0, 1.0  # Hz; share of the motors' speed
 
 @cache
 def robot() -> Robot:
-    """Return the iCub."""
+    """Return the robot of this experiment, the iCub."""
     return load_robot(ROBOT)
 
 
 def new_map() -> AdaptiveRoadmap:
-    """Return the map before any observation."""
+    """Return a new roadmap with three poses of the right arm (RIGHT, LEFT and ABOVE the ball) without observations."""
     arm = robot().parts[PART]
     samples = np.zeros((len(POSES), 7))
     samples[:, :4] = POSES
@@ -56,23 +56,28 @@ def new_map() -> AdaptiveRoadmap:
 
 
 def model() -> Model:
-    """Return the model, with the ball as a ghost."""
+    """Return a model of the robot and its world, where the ball is a ghost: it exerts no force."""
     return Model(robot(), load_world(str(WORLD)))
 
 
 def ball() -> Array:
-    """Return the position of the ball, (3,) m."""
+    """Return the position of the ball in the model's world, (3,) m, root frame."""
     return model().world.objects[BALL].position
 
 
 class Job(Struct, frozen=True):
-    """Crossings to make: the times [s] after their start at which the ball becomes solid."""
+    """The crossings that a launch makes.  `after`: for each, the time [s] after its start at which the ball becomes solid."""
 
     after: list[float]
 
 
 class Acted(Struct, frozen=True):
-    """A motion; ticks are robot_sim's."""
+    """A motion of the arm along an edge of the roadmap.
+
+    Ticks are those of robot_sim.  `vertex`: the goal.  `asked`: tick of the request.  `commanded`: tick in which a command computed after
+    the request was first in force.  `bump`: tick at which the model first reported that the arm touches the ball; -1: never.  `ended`: tick
+    at which the end was received.  `thinking`: processor time [s] between the end of the motion before and this request.
+    """
 
     vertex: int  # its target
     asked: int  # tick of the request
@@ -83,7 +88,10 @@ class Acted(Struct, frozen=True):
 
 
 class Crossing(Struct, frozen=True):
-    """One crossing from the right of the ball to its left."""
+    """One crossing of the arm from the right of the ball to its left.
+
+    `solid`: tick at which the ball was made solid.  `motions`: its motions, in order.
+    """
 
     solid: int  # tick at which the ball was made solid
     motions: list[Acted]
@@ -94,7 +102,7 @@ AWAY = [0.6, 0.9, 0.6]  # m, a place of the simulator's ball out of reach
 
 
 def perform(service: Service, folder: Path) -> None:
-    """Make the crossings of the job in the folder."""
+    """Make the crossings of the job in `folder` with the live robot, and append each to the file of finished crossings there."""
     job = read_job(folder, Job)
     new_map().plan(RIGHT, LEFT)  # imports what planning needs before the robot moves
     with ExitStack() as stack:
@@ -112,7 +120,7 @@ def perform(service: Service, folder: Path) -> None:
 
 
 def cross_undisturbed(crosser: Crosser, after: float) -> Crossing:
-    """Make a crossing; repeat it if the robot holds in between, as on a machine too busy for real time."""
+    """Make a crossing whose ball becomes solid after `after` s.  A hold interrupts it, and then the crossing is repeated."""
     while True:
         try:
             return crosser.cross(after)
@@ -121,7 +129,10 @@ def cross_undisturbed(crosser: Crosser, after: float) -> Crossing:
 
 
 class Crosser:
-    """The arm as a plant that records its motions and makes the ball solid during a crossing."""
+    """A plant for `Walker` that moves the right arm, records its motions and makes the ball solid during a crossing.
+
+    `motions`: the motions of the present crossing.  `hand`: the plant that moves the arm.
+    """
 
     def __init__(self, service: Service, hand: ContactStopPlant) -> None:
         self.robot, self.motions = hand.robot, list[Acted]()
@@ -135,15 +146,15 @@ class Crosser:
 
     @property
     def q(self) -> Array:
-        """See Plant."""
+        """The present encoder values of all motors, (n,) rad."""
         return self._hand.q
 
     def measure(self, part: str) -> Array:
-        """See Plant."""
+        """Return the present encoder values of the motors of `part`, (n_part,) rad; see `mobee.plant.Plant.measure`."""
         return self._hand.measure(part)
 
     def act(self, part: str, target: Array) -> Outcome:
-        """See Plant."""
+        """Move the part to `target` (n_part,) rad, record the motion in `motions`, and return its outcome; see `mobee.plant.Plant.act`."""
         space, hand, asked_for = self._map.space, self._hand, time.process_time()
         vertex = int(np.abs(space.samples - target[space.columns]).max(axis=1).argmin())
         outcome = hand.act(part, target)
@@ -153,7 +164,7 @@ class Crosser:
         return outcome
 
     def cross(self, after: float) -> Crossing:
-        """Cross from right to left on a new map; the ball becomes solid `after` seconds."""
+        """Move from the right of the ball to its left on a new map.  `after`: time [s] from the start until the ball becomes solid."""
         self.turn(solid=False)
         walker = Walker(new_map(), self, back=False)
         walker.go(RIGHT)
@@ -163,7 +174,10 @@ class Crosser:
         return Crossing(self._solid, list(self.motions))
 
     def turn(self, solid: bool) -> None:
-        """Make the ball solid or a ghost, in the model and in the simulator; does not wait for the answers in free mode."""
+        """Make the ball solid or a ghost in the model, and place it in the simulator or remove it out of reach.
+
+        In free mode this does not wait for the answers; raises MobeeError if a service refuses.
+        """
         role, place = "obstacle" if solid else "ghost", self._place if solid else AWAY
         if self._service.locked:
             self._service.call(keys.world_rpc("role"), SetRole, Done, name=BALL, role=role)
@@ -186,10 +200,11 @@ class Crosser:
 
 
 class ContactStopPlant(BusPlant):
-    """A BusPlant whose actions end, not settled, when the model reports that the part begins to touch one of some objects.
+    """A BusPlant whose actions end when the model reports that the part begins to touch one of some objects.
 
-    In lockstep a part in motion receives no ticks.  A second service of the same process, the watcher, therefore takes part in every
-    tick; it answers a tick after the forces of that tick have been processed, so that decisions on them fall into the same tick.
+    Such an action ends early and not settled.  In lockstep a part in motion receives no ticks.  Therefore a second service of the same
+    process, the watcher, takes part in every tick.  It answers a tick after the forces of that tick have been processed, so that decisions
+    on them fall into the same tick.
 
     Args:
         service, robot, part: see BusPlant.
@@ -202,15 +217,15 @@ class ContactStopPlant(BusPlant):
         self._part, self._objects = part, frozenset(objects)
         self._last = -MIN_GAP  # ns, time of the last force of an object
         self.bump: int | None = None
-        """Tick since the request of the last action at which the part began to touch an object; None: not yet."""
+        """Tick of robot_sim in which the part began to touch an object after the request of the last action; None: not yet."""
         self.asked = 0
-        """Tick of the request of the last action."""
+        """Tick of robot_sim in which the last action was requested."""
         self.commanded = -1
-        """Tick in which a command formed after the last request is first in force, -1: not yet."""
+        """Tick in which a command computed after the last request is first in force; -1: not yet."""
         self.on_forces: Callable[[int], None] = lambda k: None
-        """Called with every tick whose forces have been received."""
+        """Function that is called with the number of every tick whose forces have been received."""
         self.evaluated = -1
-        """The newest tick whose forces have been received."""
+        """The number of the newest tick whose forces have been received; -1: none yet."""
         self._watched = -1
         self._watcher = None if watcher is None else Participant(watcher)
         if watcher is not None:
@@ -219,12 +234,12 @@ class ContactStopPlant(BusPlant):
         service.on_each(Commands, self._note_commands)
 
     def act(self, part: str, target: Array) -> Outcome:
-        """See ContactStopPlant."""
+        """Move the part to `target` (n_part,) rad; the action also ends when the part begins to touch one of the objects."""
         self.bump = None
         return super().act(part, target)
 
     def leave(self) -> None:
-        """See BusPlant."""
+        """Release all goals and, in lockstep, end the participation of both services."""
         super().leave()
         if self._watcher is not None:
             self._watcher.done(max(self._watched, 0), last=True)

@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Roadmap from scratch: random poses, joined without verification, and explored by the robot itself.
 
-Claim: a map of 20 random samples, each joined to its 10 nearest neighbours without verifying an edge, is explored by commands
-alone; infeasible edges are removed when they are found, until the feasible sub-graph is known.  Source: thesis 4.3.1, fig. 4.6.
-Published: "approximately 90 minutes" at 10 % of maximum velocity; "small, randomly generated graphs often contain unreachable
-vertices and edges".  Run time: a minute on 2 cores offline; `--live` about 15 minutes more.
+Claim: a map of 20 random samples, each joined to its 10 nearest neighbours without verifying an edge, is explored by commands alone;
+infeasible edges are removed when they are found, until the feasible sub-graph is known.  Source: thesis 4.3.1, fig. 4.6.  Published:
+"approximately 90 minutes" at 10 % of maximum velocity; "small, randomly generated graphs often contain unreachable vertices and edges".
+Run time: a minute on 2 cores offline; `--live` about 15 minutes more.
 
-Seven joints of the right arm of `icub` at its table under the default law, at 10 % speed; on the offline plant with the identified
-motors, and with `--live` also by the real processes in lockstep with PyBullet.  A vertex is reached within 0.15 rad in every
-joint; after a failed edge the arm goes back.  Targets are drawn in proportion to untried edges; when no untried edge can be
-reached any more, RRT-Connect plans a path to a vertex with untried edges, up to three times per vertex.  Every tried edge is then
-tried once more from rest at its vertex, by another plant, to see whether both agree.  Solid contacts of the simulator's list of
-pairs are measured offline by the model, from the true joints every 0.1 s, and live by PyBullet, every tick.
+Seven joints of the right arm of `icub` at its table under the default law, at 10 % speed; on the offline plant with the identified motors,
+and with `--live` also by the real processes in lockstep with PyBullet.  A vertex is reached within 0.15 rad in every joint; after a failed
+edge the arm moves back.  Targets are drawn in proportion to untried edges; when no untried edge can be reached any more, RRT-Connect plans
+a path to a vertex with untried edges, up to three times per vertex.  Every tried edge is then tried once more from rest at its vertex, by
+another plant, to see whether both agree.  Solid contacts of the simulator's list of pairs are measured offline by the model, from the true
+joints every 0.1 s, and live by PyBullet, every tick.
 """
 
 from __future__ import annotations
@@ -70,39 +70,50 @@ JOB, DONE = "job.json", "done.json"
 
 @cache
 def robot() -> Robot:
-    """Return the robot."""
+    """Return the robot of this experiment, the iCub."""
     return load_robot(ROBOT)
 
 
 def model() -> Model:
-    """Return the model of the robot at its table."""
+    """Return a model of the robot at its table."""
     return Model(robot(), load_world(str(TABLE)))
 
 
 def joints() -> tuple[str, ...]:
-    """Return the names of the joints of the map."""
+    """Return the names of the motors that the map moves: seven of the right arm."""
     return robot().parts[PART].motors[:JOINTS]
 
 
 def new_map(seed: int) -> AdaptiveRoadmap:
-    """Return a map of random poses joined to their nearest neighbours, not verified."""
+    """Return a roadmap of 20 random poses, each joined to its 10 nearest neighbours; no edge is verified.  `seed`: of the poses."""
     return AdaptiveRoadmap(Voronoi(robot(), joints(), SAMPLES, seed, NEIGHBOURS))
 
 
 def offline_plant(seed: int) -> OfflinePlant:
-    """Return a plant of the arm with the motors that were identified on PyBullet."""
+    """Return an offline plant of the right arm at 10 % speed, with the motor parameters that were identified on PyBullet.
+
+    `seed`: of the encoder noise.
+    """
     motors = MotorParameters.identified(ROBOT)
     return OfflinePlant(model(), seed, Gains.named("default"), motors, 1.0 / RATE, speed_scale=SPEED, active=joints())
 
 
 def explorer(plant: Plant, seed: int, store: MapStore | None = None) -> MapExplorer:
-    """Return the explorer of the map of a seed; its single queries know the table."""
+    """Return an explorer of the map of this seed, which moves `plant`.
+
+    It repairs the map with paths of single-query planning (RRT-Connect) that avoid the table.  `store`: file of the observations; None: not
+    stored.
+    """
     paths = query(model(), joints(), robot().home, seed, MAX_EXTENSIONS)
     return MapExplorer(new_map(seed), plant, seed=seed, query=paths, store=store)
 
 
 class Depth:
-    """Records the deepest contact of listed solids, by the model, in the true postures of a plant."""
+    """Records the deepest solid contact of a plant, among pairs that the simulator tests too.
+
+    It is computed by the model from the true positions of the motors every 0.1 s.  `deepest`: its depth [m].  `pair`: names of the two
+    shapes.
+    """
 
     def __init__(self, plant: OfflinePlant) -> None:
         self._plant = plant
@@ -116,7 +127,11 @@ class Depth:
 
 
 def explored(seed: int, most: int | None = None) -> dict[str, Any]:
-    """Explore the map of a seed, at most `most` edges; returns the map and measures of the exploration."""
+    """Explore the map of a seed on the offline plant, with at most `most` motions along edges (None: until all are known).
+
+    Keys: those of `outcome`; "finished", and "why" not (an error's text); "minutes", robot time at the end of each motion; "deepest" and
+    "pair", the deepest solid contact [m]; "agree", the result of `agreement`.
+    """
     plant = offline_plant(seed)
     depth, search = Depth(plant), explorer(plant, seed)
     minutes: list[float] = []
@@ -133,13 +148,20 @@ def explored(seed: int, most: int | None = None) -> dict[str, Any]:
 
 
 def outcome(roadmap: AdaptiveRoadmap, repairs: int) -> dict[str, Any]:
-    """Return the map and its observations as arrays."""
+    """Return a roadmap with V vertices and at most A edges from each, and its observations, as a dict of arrays.
+
+    "samples" (V, 7) rad: poses of the vertices.  "goals" (V, A): goal of each edge, -1 for no edge.  "tried" (V, A): number of tries.
+    "feasible" (V, A): whether the last try ended at the goal.  "repairs": number of paths from single queries.
+    """
     beliefs, space = roadmap.beliefs, roadmap.space
     return {"samples": space.samples, "goals": space.goals, "tried": beliefs.tried, "feasible": roadmap.feasible, "repairs": repairs}
 
 
 def agreement(roadmap: AdaptiveRoadmap, seed: int) -> Array:
-    """Try each tried edge once more from rest at its vertex; returns (E,) whether the outcomes agree."""
+    """Try each tried edge once more from rest at its vertex, on a new offline plant.
+
+    Returns for each of the E tried edges whether it succeeds or fails as in its last try, (E,).
+    """
     plant, space = offline_plant(seed), roadmap.space
     same = []
     for state, action in np.argwhere(roadmap.beliefs.tried > 0).tolist():
@@ -153,7 +175,10 @@ def agreement(roadmap: AdaptiveRoadmap, seed: int) -> Array:
 
 
 def perform(service: Service, folder: Path) -> None:
-    """Explore the map of the job in the folder on the live robot."""
+    """Explore the map of the job in `folder` on the live robot, until it is finished or the job's number of tries is made.
+
+    Observations are stored at once, so a stopped exploration can be continued.
+    """
     job = read(folder / JOB)
     with MapStore(job["store"], PART) as store:
         plant = BusPlant(service, robot(), (PART,))
@@ -179,24 +204,25 @@ STYLES = {"feasible": ("tab:blue", 1.6), "failed": ("tab:red", 0.7), "not tried"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the option of the live run."""
+    """Add the option --live, for the live run, to the parser."""
     parser.add_argument("--live", action="store_true", help="also explore the first seed's map by the real processes, in lockstep")
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return one condition, a map for each seed; --quick: with few edges."""
+    """Return the only condition of the sweep: the exploration of a map for each seed.  With --quick: at most 30 edges."""
     return [Condition("quick-map" if arguments.quick else "map", {"most": QUICK if arguments.quick else None})]
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Explore a map."""
+    """Explore the map of this seed offline, and return the result of `explored`."""
     return explored(seed, settings["most"])
 
 
 def explore_live(folder: Path, seed: int, most: int | None) -> None:
-    """Explore the map of a seed on the live robot, or continue.
+    """Explore the map of a seed on the live robot, or continue an exploration that was stopped.
 
-    Observations are in a store; each launch has a folder for its recording.
+    `folder`: has the store of the observations, and a folder for the recording of each launch.  `most`: largest number of tries; None: no
+    limit.  Nothing is done if the exploration is finished.
     """
     folder.mkdir(exist_ok=True)
     if (folder / DONE).exists():
@@ -221,7 +247,10 @@ def _touched(launches: Sequence[Path]) -> dict[str, Any]:
 
 
 def read_live(folder: Path) -> dict[str, Any] | None:
-    """Read the map and the measures of the live exploration; None if it is not finished."""
+    """Return the map and the measures of the live exploration in `folder`; None if it is not finished.
+
+    Keys: those of `outcome`, and "finished", "hours", "touches", "deepest" [m], "pair", "agree" and "edges".
+    """
     if not (folder / DONE).exists():
         return None
     done = read(folder / DONE)
@@ -232,7 +261,7 @@ def read_live(folder: Path) -> dict[str, Any] | None:
 
 
 def unreached(values: Mapping[str, Any]) -> int:
-    """Return the number of samples that were never reached."""
+    """Return how many of the random samples of a map were never reached.  `values`: the result of `explored` or `read_live`."""
     goals, feasible = values["goals"], values["feasible"]
     reached = np.zeros(len(goals), dtype=bool)
     reached[goals[feasible]] = True
@@ -241,7 +270,10 @@ def unreached(values: Mapping[str, Any]) -> int:
 
 
 def findings(found: Cells, live: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Return a row for each map, and the measured claims."""
+    """Return the results of all cells and of the live exploration.
+
+    Keys: "maps", the numbers of each map; "claims", the judged claims.  `live`: the result of `read_live`; None: not explored live.
+    """
     results = sorted(found.values(), key=lambda result: result.cell.seed)
     rows = {f"seed {result.cell.seed}": _row(result.values) for result in results}
     if live is not None:
@@ -253,7 +285,10 @@ def findings(found: Cells, live: Mapping[str, Any] | None = None) -> dict[str, A
 
 @dataclass(frozen=True)
 class Explored:
-    """All maps, the finished ones, and the one that was explored live."""
+    """The explored maps, for the rules of the claims.
+
+    `maps`: results of `explored` for all seeds.  `done`: those that are finished.  `live`: the result of `read_live`, or None.
+    """
 
     maps: list[dict[str, Any]]
     done: list[dict[str, Any]]
@@ -316,7 +351,10 @@ CLAIMS = (known, gaps, repeatable, harmless)
 
 
 def plot(found: Cells, live: Mapping[str, Any] | None = None) -> Any:
-    """Draw three panels: the map before exploration, the explored map, edges over time."""
+    """Return a figure with three panels: the map before exploration, the explored map, and the number of motions along edges over time.
+
+    `live`: the live exploration, whose map is then drawn; None: the map of the first seed is drawn.
+    """
     results = sorted(found.values(), key=lambda result: result.cell.seed)
     drawing = new_figure(15.0, 4.8)
     before, after, course = drawing.subplots(1, 3)
@@ -371,7 +409,7 @@ SWEEP = Sweep(conditions, trial, findings, plot, add_options=add_options, requir
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Explore the maps that are not in the folder yet, and with --live the first one also on the live robot."""
+    """Explore the maps that are not in `folder` yet; with --live also the first seed's map on the live robot.  Returns the results."""
     SWEEP.run(arguments, folder)
     if arguments.live:
         explore_live(folder / "live", arguments.seed, QUICK if arguments.quick else None)
@@ -379,12 +417,12 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 def results(folder: Path) -> dict[str, Any]:
-    """Compute the findings from the finished cells, and from the live exploration if there is one."""
+    """Compute the results, as of `findings`, from the finished cells in `folder` and from its live exploration if there is one."""
     return findings(load_cells(folder), read_live(folder / "live"))
 
 
 def figure(folder: Path) -> Path:
-    """Draw the maps; raises InvalidValue if there are none."""
+    """Draw the maps of the run in `folder` to a file.  Returns its path; raises InvalidValue if there is no map."""
     found = load_cells(folder)
     if not found:
         raise InvalidValue(f"{folder} has no finished cells: the run was stopped before the first.")

@@ -2,12 +2,11 @@
 """TRM: coverage and validity of the task-relevant roadmaps of thesis figures 3.1 to 3.11 and 4.8, by evolution and by least squares.
 
 Claim: the framework produces maps for all these tasks: poses that meet the task's constraints, spread over its task space, in one graph.
-Source: thesis 3.3, 3.4 and 4.3.  Published: figures only, about 5000 poses for figure 4.8.  Run time: about 5 minutes a seed
-on 2 cores.
+Source: thesis 3.3, 3.4 and 4.3.  Published: figures only, about 5000 poses for figure 4.8.  Run time: about 5 minutes a seed on 2 cores.
 
-The tasks are in trm_tasks.py.  The reachable part of a task's box is found independently: by least squares on a lattice of half the
-spacing with many starts per point, and by random starts at random points.  A map covers those of these points that are within a spacing
-of a vertex.  Every pose is checked by python-fcl.  `python -m experiments.claims.ch3_roadmaps.trm_pictures NAME` builds one map and draws
+The tasks are in trm_tasks.py.  The reachable part of a task's box is found independently: by least squares on a lattice of half the spacing
+with many starts per point, and by random starts at random points.  Such a point counts as covered if a vertex of the map is within a
+spacing of it.  Every pose is checked by python-fcl.  `python -m experiments.claims.ch3_roadmaps.trm_pictures NAME` builds one map and draws
 it.
 """
 
@@ -55,9 +54,9 @@ MAX_OFFSET = 0.05  # of a pose from such a point, in spacings
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Coverage:
-    """Distances of reachable task points from the vertices of a map.
+    """How well the vertices of a map cover the task space.
 
-    `reachable`: task points (R, m).  `far`: (R,) distance of each from its nearest vertex, in spacings.
+    `reachable`: task points (R, m) that the robot can reach.  `far`: (R,) distance of each from its nearest vertex, in spacings.
     """
 
     reachable: Array
@@ -65,7 +64,7 @@ class Coverage:
 
     @property
     def share(self) -> float:
-        """The share of the reachable task points within a spacing of a vertex."""
+        """The share of the reachable task points that are within a spacing of a vertex."""
         return float((self.far <= 1.0).mean())
 
     @property
@@ -84,10 +83,10 @@ def reachable(
     margin: float = 0.0,
     seed: int = 1,
 ) -> Array:
-    """Return a dense set of reachable task points (R, m).
+    """Return a dense set of task points that the robot can reach, (R, m).
 
-    They are found by least squares on a lattice of half the spacing (m,), with many more starts per point than a map uses.  Others
-    are found by random starts at random points, which do not depend on neighbours.
+    Most are found by least squares on a lattice of half the spacing (m,), with many more starts per point than a map uses.  Others are
+    found by random starts at random points, which do not depend on neighbours.  The other arguments are those of `mobee.build_roadmap`.
     """
     rng = np.random.default_rng(seed)
     problem = Problem(model, costs, start, motors, margin)
@@ -96,7 +95,10 @@ def reachable(
 
 
 def coverage(points: Array, y: Array, spacing: Array) -> Coverage:
-    """Return how vertices y (V, m) cover the reachable task points (R, m) and themselves, at a spacing (m,)."""
+    """Return how well the vertices `y` (V, m) of a map cover reachable task points.
+
+    `points`: (R, m) task points; the vertices are added.  `spacing`: of the map, (m,).
+    """
     points = np.concatenate([points, y])
     far, _ = cKDTree(y / spacing).query(points / spacing)
     return Coverage(points, np.asarray(far))
@@ -111,7 +113,11 @@ def valid(
     motors: Sequence[str] | None = None,
     start: Array | None = None,
 ) -> NDArray[np.bool_]:
-    """Return (V,) whether poses q (V, n) meet all tolerances, limits and the box, and are at y (V, m), by python-fcl."""
+    """Return for each pose `q` (V, n) rad whether it is valid, (V,).
+
+    A valid pose meets all tolerances, the motors' limits and the box of the task, is at its task point in `y` (V, m), and moves only
+    `motors`.  Contacts are computed by python-fcl.
+    """
     reference = mobee.Model(solid_robot(model.robot), model.world, engine="fcl")
     pose = reference.evaluate(q)
     low, high = model.robot.limits.T
@@ -156,13 +162,16 @@ Runs = Mapping[tuple[str, str], Mapping[str, Array]]  # the COLUMNS of the maps 
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
+    """Add the command-line options of this experiment to the parser."""
     sweep_arguments(parser, seeds=5)
     parser.add_argument("--tasks", nargs="+", choices=tuple(EXAMPLES), metavar="TASK", help=f"of {', '.join(EXAMPLES)}")
 
 
 def cells(arguments: argparse.Namespace) -> list[Cell]:
-    """Return a cell for the reachable part of every task, and for its maps by every method and seed; --quick: three small tasks."""
+    """Return the cells of the run: for each task one for the reachable part, and one for each map (method and seed).
+
+    With --quick: three small tasks.
+    """
     tasks = arguments.tasks or (QUICK if arguments.quick else tuple(EXAMPLES))
     seeds = range(arguments.seed, arguments.seed + arguments.seeds)
     reach = [Cell(f"{task}-{REACH}", arguments.seed, {"task": task, "method": REACH}, 20.0) for task in tasks]
@@ -176,7 +185,7 @@ def cells(arguments: argparse.Namespace) -> list[Cell]:
 
 
 def work(cell: Cell) -> dict[str, Any]:
-    """Build one map and measure it, or find the reachable task points."""
+    """Do the work of one cell: build and measure a map, as `built`, or find the reachable task points ("points", (R, m))."""
     example, method = EXAMPLES[cell.settings["task"]](), cell.settings["method"]
     if method == REACH:
         spacing = np.broadcast_to(example.spacing, len(example.task.names)).astype(np.float64)
@@ -185,7 +194,10 @@ def work(cell: Cell) -> dict[str, Any]:
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Build the maps that are not in the folder yet."""
+    """Build the maps that are not in `folder` yet, write the measures of all maps there, and return the results.
+
+    Raises NotInstalled without python-fcl.
+    """
     importlib.import_module("mobee.model.fcl_engine")  # raises NotInstalled before anything is computed
     run_cells(work, cells(arguments), folder, arguments)
     measures: dict[str, dict[str, dict[str, list[float]]]] = {}
@@ -196,7 +208,7 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 def results(folder: Path) -> dict[str, Any]:
-    """Compute the findings from the measures of all maps, one value a seed."""
+    """Compute the results, as of `findings`, from the measures of all maps in `folder`."""
     measures = json.loads((folder / MEASURES).read_text())
     return findings(
         {
@@ -208,7 +220,12 @@ def results(folder: Path) -> dict[str, Any]:
 
 
 def built(example: Example, method: Method, seed: int) -> dict[str, Any]:
-    """Build a map; returns its measures and the map itself as arrays."""
+    """Build a map with this method ("nes" or "least_squares"), and return its measures and the map itself.
+
+    Measures: "vertices" and "evaluations", numbers; "processor_s" and "wall_s"; "valid", share of valid poses; "kept", number of edges over
+    the number of edges to nearest neighbours; "free", share of edges without contact; "connected", share of vertices in the largest
+    component.  The map: "q" (V, n) rad, "y" (V, m), "edges" (E, 2) and "spacing" (m,).
+    """
     start, wall = time.process_time(), time.perf_counter()
     roadmap = build(example, method, seed)
     wall, processor = time.perf_counter() - wall, time.process_time() - start
@@ -232,13 +249,16 @@ def built(example: Example, method: Method, seed: int) -> dict[str, Any]:
 
 
 def rebuilt(example: Example, values: Mapping[str, Any]) -> Roadmap:
-    """Return the map from the values of `built`."""
+    """Return the roadmap that `values`, a result of `built`, contains."""
     q, y, edges, spacing = (values[name] for name in ("q", "y", "edges", "spacing"))
     return Roadmap(example.model, q, y, edges, spacing, {"names": list(example.task.names)})
 
 
 def findings(runs: Runs) -> dict[str, Any]:
-    """Return the table of the maps, and the measured claims."""
+    """Return the results.
+
+    Keys: "maps", the estimates of all measures as text, by task and method; "claims", the judged claims.
+    """
     table: dict[str, dict[str, dict[str, str]]] = {}
     for (task, method), columns in runs.items():
         table.setdefault(task, {})[NAMES[method]] = {name: estimate(values, _digits(name)) for name, values in columns.items()}
@@ -246,7 +266,10 @@ def findings(runs: Runs) -> dict[str, Any]:
 
 
 def maps(found: Cells) -> Runs:
-    """Return the numbers of every map, (seeds,) each, in the order of examples and seeds; coverage NaN if the reach is unknown."""
+    """Return the measures (seeds,) of the maps, by task and method and then by the names in COLUMNS.
+
+    The coverage is NaN if the reachable points of the task are not known yet.
+    """
     reach = {one.cell.settings["task"]: one.values["points"] for one in found.values() if one.cell.settings["method"] == REACH}
     built = sorted((one for one in found.values() if one.cell.settings["method"] != REACH), key=lambda one: one.cell.seed)
     runs: dict[tuple[str, str], dict[str, Array]] = {}
@@ -260,13 +283,13 @@ def maps(found: Cells) -> Runs:
 
 
 def are_complete(runs: Runs) -> bool:
-    """Return whether every task was mapped by both methods."""
+    """Whether there are maps of every task by both methods."""
     return set(product(EXAMPLES, NAMES)) <= set(runs)
 
 
 @claim("thesis 3.4, figs. 3.1-3.11", f"maps for all 13 tasks: at least {COVERED:.0%} of the reachable task space covered", "figures only")
 def maps_of_all(runs: Runs) -> Measured:
-    """Judge whether every task has its maps; the thesis' own method decides."""
+    """Judge whether the maps of all tasks cover their task spaces; the thesis' own method, evolution, decides."""
     covered = {method: {task: float(runs[task, method]["coverage"].min()) for task in _figures()} for method in NAMES}
     return _least(covered), all(share >= COVERED for share in covered[NES].values())
 
@@ -328,7 +351,10 @@ def _digits(column: str) -> int:
 
 
 def figure(folder: Path) -> Path:
-    """Draw the cloud of the first map of every task, if possible one by evolution; raises InvalidValue without maps."""
+    """Draw a cloud of marker positions for one map of every task, on one sheet in `folder`; returns its path.
+
+    A map by evolution is preferred, and the first seed.  Raises InvalidValue without maps.
+    """
     found = load_cells(folder)
     finished = [one for one in found.values() if one.cell.settings["method"] != REACH]
     finished.sort(key=lambda one: (list(NAMES).index(one.cell.settings["method"]), one.cell.seed), reverse=True)

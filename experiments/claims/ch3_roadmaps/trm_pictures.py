@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures of maps: the positions of their markers, and a motion through each (as thesis figs. 3.1-3.11).
+"""Pictures of roadmaps: the positions of their markers, and a motion through each (as thesis figs. 3.1-3.11).
 
     python -m experiments.claims.ch3_roadmaps.trm_pictures TASK [TASK ...] [--method least_squares] [--out FOLDER]
 
-Writes TASK.npz, which `mobee roadmap` reads, too, TASK_cloud.png and TASK_film.png; with several tasks also films_one_hand.png,
-films_both_hands.png and clouds.png, all on one sheet.  A map that is there already is not built again.
+Writes TASK.npz (a roadmap that `mobee roadmap` can read), TASK_cloud.png and TASK_film.png.  For several tasks it also writes
+films_one_hand.png, films_both_hands.png and clouds.png, each with the pictures of several tasks.  A map that exists already is not built
+again.
 """
 
 from __future__ import annotations
@@ -35,13 +36,16 @@ COLUMNS = 4
 
 
 def draw_cloud(example: Example, roadmap: Roadmap, path: Path, height: int = 400) -> Path:
-    """Draw the marker positions of all poses, and the robot in the first pose of its film."""
+    """Draw the marker positions of all poses of a roadmap, and the robot in one pose, to `path`; returns `path`.
+
+    `height`: of the picture, pixels.
+    """
     shown = roadmap.q[_near(roadmap, example.via[0])]
     return marker_cloud(example.model, roadmap.q, example.markers, path, shown, title=_title(example), height=height)
 
 
 def cloud_panel(example: Example, roadmap: Roadmap, height: int) -> Panel:
-    """Draw the cloud of a map in one view with its title below."""
+    """Return a picture of the marker positions of a roadmap in one view, with its title below.  `height`: pixels."""
     shown = example.model.evaluate(roadmap.q[_near(roadmap, example.via[0])])
     pose = example.model.evaluate(roadmap.q)
     places = np.concatenate([pose.position(marker) for marker in example.markers])
@@ -49,12 +53,12 @@ def cloud_panel(example: Example, roadmap: Roadmap, height: int) -> Panel:
 
 
 def draw_film(example: Example, roadmap: Roadmap, path: Path, height: int = 260) -> Path:
-    """Draw a filmstrip of the motion through the points of the example; returns its path."""
+    """Draw a filmstrip of the example's motion to `path`; returns `path`.  `height`: of a picture, pixels."""
     return filmstrip([strip_of(example, roadmap)], path, height)
 
 
 def strip_of(example: Example, roadmap: Roadmap, poses: int = POSES) -> Strip:
-    """Return the motion as a row of a filmstrip, with the task coordinates below each pose."""
+    """Return the example's motion as a row of a filmstrip with `poses` pictures and the task coordinates below each."""
 
     def caption(motion: Motion, moment: int) -> str:
         y = example.task.of(example.model.evaluate(motion.poses[moment].q[None]))[0]
@@ -65,7 +69,7 @@ def strip_of(example: Example, roadmap: Roadmap, poses: int = POSES) -> Strip:
 
 
 def planned(example: Example, roadmap: Roadmap) -> Motion:
-    """Return the shortest path in the map through the points of the example in order."""
+    """Return the motion along the shortest path in the roadmap through the points `via` of the example, in order."""
     q = roadmap.q[roadmap.exit(example.via[0])][None]
     for y in example.via[1:]:
         q = np.concatenate([q, roadmap.path(q[-1], y)[1:]])
@@ -79,7 +83,7 @@ def planned(example: Example, roadmap: Roadmap) -> Motion:
 
 
 def caption_of(coordinates: Sequence[Coordinate], y: Array) -> str:
-    """Return task coordinates as text: lengths in cm, angles in degrees."""
+    """Return the task coordinates `y` (m,) as text: lengths in cm, angles in degrees.  `coordinates`: their names and units."""
     words = []
     for one, value in zip(coordinates, y, strict=True):
         words.append(f"{round(np.rad2deg(value))}°" if one.unit == "rad" else f"{one.name.split()[-1]} {round(100.0 * value)}")
@@ -102,7 +106,7 @@ def _moving_parts(example: Example) -> tuple[str, ...]:
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Build and draw the maps of the command line."""
+    """Build and draw the maps that the command line names."""
     parser = argparse.ArgumentParser(description="Build the maps of tasks and draw them.")
     parser.add_argument("tasks", nargs="+", choices=[*EXAMPLES, "all"], metavar="TASK", help=f"all, or of {', '.join(EXAMPLES)}")
     parser.add_argument("--method", choices=METHODS, default=METHODS[0], help="how poses are found (default: %(default)s)")
@@ -117,7 +121,10 @@ def main(argv: Sequence[str] | None = None) -> None:
 
 
 def draw_all(tasks: Sequence[str], method: Method, seed: int, out: Path) -> None:
-    """Build the map of every task, draw it and the sheets, and print a line for each."""
+    """Build and draw the map of every task, and print a line for each; with several tasks also draw sheets with all of them.
+
+    `tasks`: keys of EXAMPLES.  `seed`: of the maps.  `out`: folder of all files.
+    """
     strips: dict[str, list[Strip]] = {}
     clouds = []
     for task in tasks:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The tasks of thesis figures 3.1 to 3.11 and 4.8, a function each; docs/roadmaps.md has a task file to copy."""
+"""The tasks of thesis figures 3.1 to 3.11 and 4.8, a function for each.  A task file to copy is in docs/roadmaps.md."""
 
 from __future__ import annotations
 
@@ -47,20 +47,26 @@ def _degrees(*angles: float) -> Via:
 
 
 def held(width: float) -> tuple[Term, Term]:
-    """Return costs that hold the palms face to face at a distance [m]: position and orientation of one in the frame of the other."""
+    """Return two costs that hold the palms face to face with a distance of `width` [m].
+
+    They fix the position and the orientation of the right palm in the frame of the left palm.
+    """
     return costs.relative_position(RIGHT, LEFT, (0.0, 0.0, -width)), costs.relative_orientation(RIGHT, LEFT, np.eye(3))
 
 
 def between_palms(model: Model, shape: Geometry, width: float) -> None:
-    """Attach an object between both hands, its z axis from palm to palm, its x axis along the fingers."""
+    """Attach an object of the given shape between both hands, in the world of the model.
+
+    Its z axis points from palm to palm, its x axis along the fingers.  `width`: distance between the palms [m].
+    """
     carry(model, "held", shape, LEFT, 0.5 * width, (0, 0, 1))
 
 
 def both_held() -> Example:
     """Both hands hold an object and move it up and down, forward and back (thesis fig. 3.1, left).
 
-    The pose of the hands relative to each other is fixed, as by a box between them, and the box stays level and straight before the robot;
-    the task space is the height of the hands and their forward position.
+    The pose of one hand relative to the other is fixed, as if a box were between them.  The box stays level, straight and in front of the
+    robot.  The task space is the position (x, z) of the hands, in m, root frame.
     """
     width = 0.20  # m, from palm to palm
     model = at_table()
@@ -72,9 +78,10 @@ def both_held() -> Example:
 
 
 def elbow_down() -> Example:
-    """The right hand goes anywhere while its elbow stays down (thesis fig. 3.1, right).
+    """The right hand moves in front of the robot while its elbow stays low (thesis fig. 3.1, right).
 
-    The elbow is never higher than 10 cm below the shoulder; the task space is the place of the hand.
+    The elbow is never higher than 5 cm above the root frame's origin, 10 cm below the shoulder.  The task space is the position (x, y, z)
+    of the hand, in m, root frame.
     """
     highest = 0.05  # m, of the elbow
     task = tasks.place(RIGHT, "xyz", [(-0.48, -0.12), (-0.20, 0.44), (-0.06, 0.38)])
@@ -83,7 +90,10 @@ def elbow_down() -> Example:
 
 
 def palm_side() -> Example:
-    """The right hand moves over the table, its palm to the side (thesis fig. 3.2, left): left and right, forward and back."""
+    """The right hand moves 10 cm above the table, its palm to the side (thesis fig. 3.2, left).
+
+    The task space is the position (x, y) of the hand, in m, root frame: back and forward, left and right.
+    """
     terms = [costs.orientation(RIGHT, TO_THE_LEFT), costs.plane(RIGHT, UP, 0.0)]  # 10 cm above the table
     task = tasks.place(RIGHT, "xy", [(-0.56, -0.10), (-0.30, 0.46)])
     via = [(-0.20, 0.20), (-0.44, 0.16), (-0.36, -0.08), (-0.26, 0.14)]
@@ -91,7 +101,10 @@ def palm_side() -> Example:
 
 
 def palm_down() -> Example:
-    """The right hand moves over the table, its palm down (thesis fig. 3.2, right): left and right, forward and back."""
+    """The right hand moves 10 cm above the table, its palm down (thesis fig. 3.2, right).
+
+    The task space is the position (x, y) of the hand, in m, root frame: back and forward, left and right.
+    """
     terms = [costs.orientation(RIGHT, DOWN), costs.plane(RIGHT, UP, 0.0)]  # 10 cm above the table
     task = tasks.place(RIGHT, "xy", [(-0.56, -0.06), (-0.30, 0.50)])
     return one_hand(at_table(), "palm down", "3.2, right", terms, task, 0.02, via=OVER_TABLE)
@@ -100,8 +113,8 @@ def palm_down() -> Example:
 def raise_glass() -> Example:
     """Raise a glass: the held object stays upright at every position of the hand (thesis fig. 3.3).
 
-    The thumb points up (root frame).  The hand may turn about the vertical axis, because this does not tilt the glass.  The task space is
-    the position of the hand, (x, y, z) in m.  The map serves to pick and place objects that must stay upright.
+    The thumb points up (root frame).  The hand may rotate about the vertical axis, because this does not tilt the glass.  The task space is
+    the position (x, y, z) of the hand, in m, root frame.  The roadmap is useful for picking and placing objects that must stay upright.
     """
     model = at_table()
     carry(model, "glass", mobee.cylinder(0.03, 0.12), RIGHT, 0.045, THUMB)
@@ -115,8 +128,8 @@ def raise_glass() -> Example:
 def bimanual_inspect() -> Example:
     """Look at an object in both hands from all sides: the hands stay, the head moves (thesis figs. 3.4; 3.1, centre).
 
-    Both hands keep their position and orientation, and the gaze stays on the object.  The task space is the position of the head: left and
-    right, forward and back.
+    Both hands keep their position and orientation, and the gaze stays on the object.  The task space is the position (x, y) of the head, in
+    m, root frame: back and forward, left and right.
     """
     width = 0.20  # m, from palm to palm
     middle = np.array([-0.30, 0.0, 0.05])  # m
@@ -132,10 +145,10 @@ def bimanual_inspect() -> Example:
 
 
 def inspect_hand() -> Example:
-    """Turn the hand with an object in front of the eyes (thesis fig. 3.5).
+    """Rotate the right hand and its object in front of the eyes (thesis fig. 3.5).
 
-    The hand stays at one place and the face is turned to it; the task space is the angle of the palm's normal to the direction of gaze, in
-    the horizontal plane: 0 when the palm faces away, half a turn when it is seen from the front.
+    The hand stays at one position, and the gaze is directed at it.  The task space is the angle [rad] of the palm's normal about the
+    vertical axis: 0 when the palm points forward, away from the robot, and pi when the eyes see it from the front.
     """
     place = (-0.26, 0.05, 0.28)  # m
     model = alone()
@@ -150,8 +163,8 @@ def inspect_hand() -> Example:
 def push_forward() -> Example:
     """Push a large object forward with both hands (thesis fig. 3.6).
 
-    The pose of the hands relative to each other is fixed, as is their height; the task space is their forward position.  The object neither
-    turns nor moves aside.
+    The pose of one hand relative to the other is fixed, and so is their height.  The object neither rotates nor moves sideways.  The task
+    space is the position x of the hands, in m, root frame: back and forward.
     """
     width, height = 0.24, 0.0  # m
     model = at_table()
@@ -165,8 +178,8 @@ def push_forward() -> Example:
 def push_over() -> Example:
     """Push a large object to the side with both hands (thesis fig. 3.7).
 
-    The pose of the hands relative to each other is fixed, as is their height; the task space is their sideways position.  The object
-    neither turns nor moves forward.
+    The pose of one hand relative to the other is fixed, and so is their height.  The object neither rotates nor moves forward.  The task
+    space is the position y of the hands, in m, root frame: left and right.
     """
     width, height, before = 0.20, 0.0, 0.32  # m
     model = at_table()
@@ -176,10 +189,10 @@ def push_over() -> Example:
 
 
 def reach_into() -> Example:
-    """Reach into a box that is open above (thesis fig. 3.8).
+    """Reach with the right hand into a box that is open above (thesis fig. 3.8).
 
-    The only constraint is that nothing is touched; the task space is the place of the hand, in the box and above it.  For picking from the
-    box and placing into it.
+    The only constraint is that nothing is touched.  The task space is the position (x, y, z) of the hand, in m, root frame, in the box and
+    above it.  The roadmap is useful for picking from the box and placing into it.
     """
     x, y, floor = -0.27, 0.17, -0.22  # m, of the box
     model = alone()
@@ -212,17 +225,17 @@ def _turned(
 
 
 def bimanual_rotate() -> Example:
-    """Rotate a large object between both hands about the forward direction, as a steering wheel (thesis fig. 3.9).
+    """Rotate a large object between both hands about the forward direction, like a steering wheel (thesis fig. 3.9).
 
-    The task space is the angle of the right palm's normal in the plane of up/down and left/right.
+    The task space is the angle [rad] of the right palm's normal in the vertical plane of y and z; 0 when the palm faces left.
     """
     return _turned(alone(), "bimanual rotate", "3.9", 0.20, FORWARD, 0.4 * np.pi, "front", _degrees(-55.0, 55.0))
 
 
 def bimanual_twist() -> Example:
-    """Twist a large object between both hands about the vertical (thesis fig. 3.10).
+    """Rotate a large object between both hands about the vertical axis (thesis fig. 3.10).
 
-    The task space is the angle of the right palm's normal in the plane of the table.
+    The task space is the angle [rad] of the right palm's normal in the horizontal plane; 0 when the palm faces left.
     """
     return _turned(at_table(), "bimanual twist", "3.10", 0.18, UP, np.pi / 2, "top", _degrees(-40.0, 40.0))
 
@@ -230,8 +243,8 @@ def bimanual_twist() -> Example:
 def unscrew() -> Example:
     """Unscrew the cap of a bottle (thesis fig. 3.11).
 
-    The left hand keeps its place and orientation; the right hand stays above it with its palm down.  The task space is the angle of the
-    right hand about its palm's normal, 0 when its fingers point forward.
+    The left hand holds the bottle and keeps its position and orientation; the right hand stays above it with its palm down.  The task space
+    is the angle [rad] of the right hand about the vertical axis, 0 when its fingers point forward.
     """
     bottle = np.array([-0.32, 0.02, 0.05])  # m, where the left hand holds it
     model = alone()
@@ -246,10 +259,10 @@ def unscrew() -> Example:
 
 
 def pregrasp() -> Example:
-    """The right hand over all of the table that it reaches, palm down, as before a grasp (thesis fig. 4.8): 4400 poses.
+    """Move the right hand, palm down, 6 cm above the table, to where it could begin a grasp (thesis fig. 4.8).
 
-    The thesis counts one for every square centimetre of half a square metre, for which both hands are needed; the right palm reaches
-    0.3 m^2.
+    The task space is the position (x, y) of the hand, in m, root frame.  The map has about 4400 poses.  The thesis has about 5000, one for
+    every square centimetre of half a square metre; this area needs both hands, and the right palm reaches only 0.3 m^2.
     """
     terms = [costs.orientation(RIGHT, DOWN), costs.plane(RIGHT, UP, -0.04)]  # 6 cm above the table
     task = tasks.place(RIGHT, "xy", [(-0.74, -0.14), (-0.75, 0.75)])

@@ -68,7 +68,7 @@ Rows = Mapping[str, Mapping[str, Any]]  # by mode
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
+    """Add the command-line options of this experiment to the parser."""
     add_backend(parser)
     parser.add_argument("--minutes", type=positive_number, default=120.0, metavar="M", help="of robot time in each mode (default: 120)")
     parser.add_argument("--trial", type=positive_number, default=10.0, metavar="M", help="robot time of a trial (default: 10)")
@@ -76,7 +76,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Run the trials that are not in the folder yet; returns the table, and whether the claims hold."""
+    """Run the trials that are not in `folder` yet, and return the results.
+
+    Keys: "judged", whether each claim holds, by its text; "passed", whether all hold; with --json also "modes", the result of `summarise`
+    by mode.  Without --json a table is printed.
+    """
     robot = load_robot(ROBOT)
     lengths = trial_lengths(arguments.minutes, arguments.trial)
     total, done = len(lengths) * len(arguments.modes), 0
@@ -114,19 +118,23 @@ def _shower(progress: Progress, done: int, total: int, text: str) -> Callable[[f
 
 
 def trial_lengths(minutes: float, trial: float) -> list[float]:
-    """Return the lengths of the trials that add up to `minutes`; the last may be shorter."""
+    """Return the durations [min] of trials that last `minutes` in all.  Each lasts `trial` min; the last may be shorter."""
     whole = int(minutes / trial + 1e-9)
     rest = minutes - whole * trial
     return [trial] * whole + ([rest] if rest > 1e-6 * trial else [])
 
 
 def read_trials(folder: Path, mode: str) -> list[Trial]:
-    """Read all finished trials of a mode, in order."""
+    """Read the finished trials of a mode from the folder of a run, in order.  `mode`: a key of TITLES ("off", "one" or "two")."""
     return [read_trial(path) for path in sorted(folder.glob(f"{mode}/*/{TRIAL}"))]
 
 
 def summarise(trials: Sequence[Trial]) -> dict[str, Any]:
-    """Return the row of a mode: depths in mm, angles in degrees, paths in rad."""
+    """Return the numbers of one mode over all its trials.
+
+    Main keys: "collisions", number of solid contacts, with "deepest_mm" and "pairs"; "commands" and their outcomes "completed", "deflected"
+    and "returned"; "worst_beyond_limit_deg"; "jerk_over_speed" [1/s^2].  Angles are in degrees where the key says so, else in rad.
+    """
     touches = [touch for trial in trials for touch in trial.touches]
     commands = [command for trial in trials for command in trial.commands]
     seconds = sum(trial.seconds for trial in trials)
@@ -165,7 +173,10 @@ def summarise(trials: Sequence[Trial]) -> dict[str, Any]:
 
 
 def verdict(rows: Rows) -> dict[str, bool]:
-    """Judge the claims for which the modes were run."""
+    """Return whether each claim holds, by its text.  A claim is absent if the modes that it compares were not run.
+
+    `rows`: results of `summarise`, by mode.
+    """
     claims: dict[str, bool] = {}
     off, one, two = (rows.get(mode) for mode in ("off", "one", "two"))
     if off:
@@ -181,7 +192,10 @@ def verdict(rows: Rows) -> dict[str, bool]:
 
 
 def share(row: Mapping[str, Any], count: str) -> float:
-    """Return a count as a share of the commands; 0 without commands."""
+    """Return a count as a share of the commands, in [0, 1]; 0 if there are no commands.
+
+    `row`: a result of `summarise`.  `count`: a key of it.
+    """
     return float(row[count] / row["commands"]) if row["commands"] else 0.0
 
 
@@ -199,7 +213,7 @@ def _mean(values: Sequence[float]) -> float | None:
 
 
 def depth_histogram(events: Iterable[Touch]) -> dict[str, int]:
-    """Count the events by range of depth in mm."""
+    """Return the number of contacts in each range of depth.  The keys are the ranges in mm, as text."""
     depths = [1e3 * event.depth for event in events]
     bounds = (0.0, *EDGES, float("inf"))
     labels = [f"<{EDGES[0]:g}", *(f"{low:g}-{high:g}" for low, high in zip(EDGES, EDGES[1:], strict=False)), f">{EDGES[-1]:g}"]
@@ -207,7 +221,7 @@ def depth_histogram(events: Iterable[Touch]) -> dict[str, int]:
 
 
 def as_table(rows: Rows) -> str:
-    """Return the rows as a text table with a column for each mode."""
+    """Return the results as a text table with a column for each mode.  `rows`: results of `summarise`, by mode."""
     lines = [_line("", [TITLES[mode] for mode in rows])]
 
     def add(label: str, text: Mapping[str, str]) -> None:
@@ -266,7 +280,7 @@ def _number(value: float | None, digits: int) -> str:
 
 
 def figure(folder: Path) -> Path:
-    """Draw the finished trials; raises InvalidValue if there are none."""
+    """Draw the finished trials of the run in `folder` to a file.  Returns its path; raises InvalidValue if there are none."""
     trials = {mode: found for mode in MODES if (found := read_trials(folder, mode))}
     if not trials:
         raise InvalidValue(f"{folder} has no finished trial: the run was stopped before the first was over.")
@@ -274,7 +288,10 @@ def figure(folder: Path) -> Path:
 
 
 def plot(rows: Rows) -> Any:
-    """Draw collisions by pair and by depth, outcomes of the commands, and roughness; rows as from `summarise`, by mode."""
+    """Return a figure of collisions by pair and by depth, of the outcomes of the commands, and of the roughness of the motion.
+
+    `rows`: results of `summarise`, by mode.
+    """
     drawing = new_figure(11.0, 7.5)
     axes = drawing.subplots(2, 2)
     minutes = ", ".join(f"{TITLES[mode]} {row['minutes']:g} min" for mode, row in rows.items())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One trial of `babbling`: commands, a new system of real processes in lockstep that executes them, and its measures."""
+"""One trial of `babbling`: commands, a new system of real processes in lockstep that executes them, and the measurements."""
 
 from __future__ import annotations
 
@@ -28,12 +28,15 @@ Ending = Literal["over", "settled", "timeout", "refused"]  # over: its time has 
 
 
 def moved_motors(robot: Robot) -> Array:
-    """Return the indices of the 23 motors: torso 3, head with eyes 6, and 7 of each arm."""
+    """Return the indices of the 23 motors that babble: 3 of the torso, 6 of head and eyes, and 7 of each arm."""
     return np.array([i for i, name in enumerate(robot.motors) if not any(word in name for word in HANDS)])
 
 
 class Targets:
-    """Random postures, uniform over the whole ranges of the 23 motors, hands at home; a seed always gives the same sequence."""
+    """A sequence of random postures, uniform over the whole ranges of the 23 motors, with the hands at home.
+
+    Equal seeds give equal sequences.
+    """
 
     def __init__(self, robot: Robot, seed: int) -> None:
         self._rng = np.random.default_rng([seed, 0xBABB1E])
@@ -41,23 +44,23 @@ class Targets:
         self._home, self._limits = robot.home, robot.limits[self._moved]
 
     def next(self) -> Array:
-        """Return the next posture of the whole robot, (n,) rad."""
+        """Return the next posture of all motors, (n,) rad."""
         q = self._home.copy()
         q[self._moved] = self._rng.uniform(self._limits[:, 0], self._limits[:, 1])
         return q
 
 
 class PositionMove:
-    """A minimum-jerk motion from rest to rest; arrays (n,) rad."""
+    """A minimum-jerk motion of all motors from rest to rest.  `duration`: that of the slowest motor [s]."""
 
     def __init__(self, start: Array, target: Array, speed: Array) -> None:
-        """`speed` (n,) rad/s: largest speed of each motor."""
+        """`start`, `target`: positions (n,) rad.  `speed`: (n,) rad/s, the largest speed of each motor."""
         self._start, self._distance = start, target - start
         self._durations = PEAK * np.abs(self._distance) / speed
         self.duration = float(self._durations.max())  # s
 
     def at(self, t: float) -> Array:
-        """Return the reference position (n,) rad at t [s] after the start."""
+        """Return the reference positions (n,) rad at time `t` [s] after the start; after the end, the target."""
         share = np.divide(t, self._durations, out=np.ones_like(self._durations), where=self._durations > 0.0).clip(0.0, 1.0)
         smooth = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
         position: Array = self._start + smooth * self._distance
@@ -65,7 +68,11 @@ class PositionMove:
 
 
 class Commanded(Struct, frozen=True, forbid_unknown_fields=True):
-    """A posture that was commanded to all parts at once."""
+    """A posture that was commanded to all parts at once.
+
+    `begin`: tick of the command.  `end`: tick at which its outcome is judged.  `target`: positions of all motors [rad].  `endings`: how the
+    command ended, by part: "over" (its time has passed), "settled", "timeout" or "refused" (ended by the safety layer).
+    """
 
     begin: int  # tick
     end: int  # tick at which the outcome is judged
@@ -74,19 +81,19 @@ class Commanded(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class CommandLog:
-    """A file of commands; each command is on disk when `note` returns."""
+    """A file of commands, one JSON text per line; each command is on disk when `note` returns."""
 
     def __init__(self, path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         self._file: TextIO = path.open("w", buffering=1)
 
     def note(self, commanded: Commanded) -> None:
-        """Append a command that has ended."""
+        """Append a command that has ended to the file."""
         self._file.write(encoded(commanded) + "\n")
 
 
 def read_commands(path: Path) -> list[Commanded]:
-    """Read all commands that have ended; an incomplete last line is ignored."""
+    """Read all commands that `CommandLog` wrote to a file; an incomplete last line is ignored."""
     *whole, _ = path.read_text().split("\n")
     return [decoded(line, Commanded) for line in whole]
 
@@ -142,7 +149,10 @@ Outcome = Literal["completed", "deflected", "returned"]
 
 
 def scenario(mode: str, folder: Path, seed: int, backend: str = PHYSICS[0]) -> str:
-    """Return the text of the scenario; recordings go to the folder."""
+    """Return the text of a scenario for one trial; the system writes its recordings into `folder`.
+
+    `mode`: "off" (without MoBeE), "one" (MoBeE 1.0) or "two" (MoBeE 2.0).  `backend`: physics engine of the robot.
+    """
     where = _quoted(folder)
     gains = 'gains = "default"' if mode == "two" else ""
     at, robot_of = "goals" if mode == "two" else "drives", FILTERED if mode == "one" else NAMESPACE
@@ -157,15 +167,15 @@ def _quoted(path: Path) -> str:
 
 
 class TrialFailed(MobeeError):
-    """Raised when a trial fails; the message names its logs."""
+    """Raised when a trial fails; the message says where its logs are."""
 
 
 def run_trial(
     folder: Path, mode: str, robot: Robot, seed: int, ticks: int, show: Callable[[float], None], backend: str = PHYSICS[0]
 ) -> None:
-    """Run a trial; writes commands, positions, contacts and the launcher's summary into the folder.
+    """Run a trial of `ticks` ticks, and write commands, positions, contacts and the launcher's summary into `folder`.
 
-    `show` is called with the finished share.  Raises TrialFailed, and LaunchFailed.
+    `mode`: "off", "one" or "two".  `show` is called with the finished share in [0, 1].  Raises TrialFailed, and LaunchFailed.
     """
     folder.mkdir(parents=True, exist_ok=True)
     for left in (COMMANDS, POSITIONS):  # of an interrupted trial
@@ -195,7 +205,12 @@ def _size(path: Path) -> int:
 
 
 class Judged(Struct, frozen=True):
-    """A command and its outcome."""
+    """A command and its outcome.
+
+    `outcomes`: by part, "completed", "deflected" or "returned".  `endings`: by part, as in `Commanded`.  `left`: by part, the largest
+    remaining error of a motor [rad].  `duration`: [s].  `path`: length of the motors' paths, summed [rad].  `way`: the same for the
+    straight path to the target [rad].
+    """
 
     outcomes: dict[str, Outcome]  # by part
     endings: dict[str, Ending]  # by part
@@ -206,7 +221,11 @@ class Judged(Struct, frozen=True):
 
 
 class Lockstep(Struct, frozen=True):
-    """The launcher's summary of the run's ticks."""
+    """The part of the launcher's summary that concerns lockstep.
+
+    `ticks`: number of ticks.  `speed`: in multiples of real time.  `repeatable`: whether all processes answered every tick in time.
+    `states_sha256`: hash of the stream of states.
+    """
 
     ticks: int
     speed: float  # x real time
@@ -221,7 +240,12 @@ class _Summary(Struct):
 
 
 class Trial(Struct, frozen=True):
-    """The numbers of one trial."""
+    """The measurements of one trial.
+
+    `seconds`: robot time [s].  `commands`: outcomes of all commands.  `touches`: contacts of solids.  `beyond`: largest distance of a motor
+    beyond a limit [rad], negative inside; `motor`: its name.  `speed_squared` and `jerk_squared`: means over ticks and motors, in (rad/s)^2
+    and (rad/s^3)^2.  `jerk_max`: [rad/s^3].  `path`: length of the motors' paths, summed [rad].  `lockstep`: of the launcher's summary.
+    """
 
     seconds: float  # robot time
     commands: list[Judged]
@@ -236,7 +260,7 @@ class Trial(Struct, frozen=True):
 
 
 def measure(folder: Path, robot: Robot, dt: float) -> Trial:
-    """Measure a finished trial from the files in its folder."""
+    """Compute the measurements of a finished trial from the files in its folder.  `dt`: duration of a tick [s]."""
     q_all = read_positions(folder, robot)
     moved = moved_motors(robot)
     q = q_all[:, moved]
@@ -257,7 +281,10 @@ def measure(folder: Path, robot: Robot, dt: float) -> Trial:
 
 
 def judge(commanded: Commanded, q_all: Array, robot: Robot, dt: float) -> Judged:
-    """Return the outcome of a command; q_all: (ticks, n) rad at the ends of the ticks, row 0 is tick 1."""
+    """Return the outcome of a command.
+
+    `q_all`: (ticks, n) rad, positions of the motors at the ends of the ticks; row 0 is tick 1.  `dt`: duration of a tick [s].
+    """
     moved = moved_motors(robot)
     target = np.array(commanded.target)
     course = q_all[max(commanded.begin - 2, 0) : max(commanded.end - 1, 1)]  # from the beginning of tick `begin` to that of `end`
@@ -282,35 +309,38 @@ def _outcome(left: float, gone: float) -> Outcome:
 
 
 def write_trial(path: Path, trial: Trial) -> None:
-    """Write a trial, whole or not at all."""
+    """Write the measurements of a trial to a file.  An interruption leaves no incomplete file."""
     new = path.with_suffix(".new")
     new.write_text(encoded(trial, indent=1))
     new.replace(path)
 
 
 def read_trial(path: Path) -> Trial:
-    """Read a trial written by `write_trial`."""
+    """Read the measurements of a trial from a file that `write_trial` wrote."""
     return decoded(path.read_text(), Trial)
 
 
 def beyond_limits(q: Array, limits: Array) -> Array:
-    """Return the largest distance of each motor beyond its limits, (m,) rad, negative inside; q (ticks, m), limits (m, 2) rad."""
+    """Return the largest distance of each motor beyond its limits, (m,) rad; negative for a motor that stays inside.
+
+    `q`: (ticks, m) rad.  `limits`: (m, 2) rad, lower and upper.
+    """
     worst: Array = np.maximum(limits[:, 0] - q.min(axis=0), q.max(axis=0) - limits[:, 1])
     return worst
 
 
 def path_length(q: Array) -> float:
-    """Return the length of the path summed over all motors, rad; q (ticks, m)."""
+    """Return the length of the path [rad], summed over all motors.  `q`: positions (ticks, m) rad."""
     return float(np.abs(np.diff(q, axis=0)).sum())
 
 
 def speed(q: Array, dt: float) -> Array:
-    """Return the first differences of q (ticks, m) rad over dt [s], (ticks - 1, m) rad/s."""
+    """Return the velocities (ticks - 1, m) rad/s, the first differences of the positions `q` (ticks, m) rad over `dt` [s]."""
     first: Array = np.diff(q, axis=0) / dt
     return first
 
 
 def jerk(q: Array, dt: float) -> Array:
-    """Return the third differences of q (ticks, m) rad over dt [s] cubed, (ticks - 3, m) rad/s^3."""
+    """Return the jerk (ticks - 3, m) rad/s^3: the third differences of the positions `q` (ticks, m) rad over `dt` [s] cubed."""
     third: Array = np.diff(q, n=3, axis=0) / dt**3
     return third

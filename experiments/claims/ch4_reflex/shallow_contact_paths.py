@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Straight paths of the hand into the table's field at any angle, and a client that sends position references along one."""
+"""Straight paths of the hand into the table's field at any angle, and a client that sends position references along such a path."""
 
 from __future__ import annotations
 
@@ -34,7 +34,11 @@ HIGHEST_START = 0.15  # m, of the palm
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Spot:
-    """A place at which the hand just touches the table's field, and the heading of its paths."""
+    """A place at which the left hand just touches the table's field, and the direction of the paths through it.
+
+    `q`: posture there, (n,) rad.  `position` (3,) m and `rotation` (3, 3): pose of the palm, root frame.  `heading`: horizontal unit vector
+    (3,), root frame.
+    """
 
     q: Array  # (n,) rad
     position: Array  # (3,) m, of the palm
@@ -44,14 +48,20 @@ class Spot:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HandPath:
-    """Postures (w, n) rad from above the start, through the start, into the field; `start`: index of the start."""
+    """A path of the hand from above the table, through the beginning of the straight approach, into the table's field.
+
+    `postures`: (w, n) rad.  `start`: index of the posture in which the straight approach begins.
+    """
 
     postures: Array
     start: int
 
 
 class Table:
-    """The iCub at its table, and the paths of its left hand there."""
+    """The iCub at its table, and straight paths of its left hand into the table's field.
+
+    `robot`, `model`: the iCub and its model at the table.  `watch`: check for violations.
+    """
 
     def __init__(self) -> None:
         self.robot: Robot = load_robot("icub")
@@ -70,7 +80,7 @@ class Table:
             self._home[self.robot.motor_index(name)] = np.deg2rad(degrees)
 
     def spots(self, number: int, seed: int) -> list[Spot]:
-        """Return `number` random spots that have paths at 90, 45 and 0 degrees."""
+        """Return `number` random spots through which there are paths at 90, 45 and 0 degrees to the table's top."""
         rng = np.random.default_rng([seed, 0x67])
         found: list[Spot] = []
         while len(found) < number:
@@ -115,7 +125,7 @@ class Table:
         return Spot(q, np.array([*position[:2], high]), rotation, direction)
 
     def path(self, spot: Spot, angle: float) -> HandPath | None:
-        """Return the path through the spot at an angle [rad] to the table's top; None if the arm cannot follow it."""
+        """Return the path through the spot at an angle [rad] to the table's top; None if the arm cannot follow this path."""
         direction = np.cos(angle) * spot.heading - np.array([0.0, 0.0, np.sin(angle)])
         into = self._line(spot.q, spot, [spot.position + s * direction for s in np.arange(STEP, BEHIND + 1e-9, STEP)])
         back = self._line(spot.q, spot, [spot.position - s * direction for s in np.arange(STEP, BEFORE + 1e-9, STEP)])
@@ -163,7 +173,10 @@ def _is_on_table(violations: Sequence[Violation], touching: tuple[str, ...]) -> 
 
 
 class Client:
-    """A client that sends position references along a path, tick by tick, and starts again after a failure."""
+    """A client that sends position references along a path, one per tick, and starts again after a failure.
+
+    `begin`: index of the reference in which the straight approach begins.  `runs`: number of departures from there.
+    """
 
     def __init__(self, robot: Robot, path: HandPath, dt: float) -> None:
         fastest = SPEED * np.array([motor.max_velocity for motor in robot.motor_table])
@@ -177,28 +190,28 @@ class Client:
 
     @property
     def start(self) -> Array:
-        """The posture above the start in which the robot begins, (n,) rad."""
+        """The first posture of the path, above the table, in which the robot begins, (n,) rad."""
         start: Array = self._references[0]
         return start
 
     @property
     def leaves_start(self) -> bool:
-        """Whether the next reference is the start, where a new position command begins."""
+        """Whether the next reference is the beginning of the straight approach, where a new position command begins."""
         return self._next == self.begin
 
     @property
     def is_over(self) -> bool:
-        """Whether the last reference was sent."""
+        """Whether the last reference of the path was sent."""
         return self._next >= len(self._references)
 
     def next(self) -> Array:
-        """Return the next reference (n,) rad; after the end the last one."""
+        """Return the next reference (n,) rad; after the end of the path, the last one again."""
         self.runs += self.leaves_start
         reference: Array = self._references[min(self._next, len(self._references) - 1)]
         self._next += 1
         return reference
 
     def retry(self, q: Array) -> None:
-        """Continue from the beginning or from the start of the path, whichever is nearer to q (n,) rad."""
+        """Continue with the reference nearer to `q` (n,) rad: the first of the path, or that at the beginning of the straight approach."""
         places = (0, self.begin)
         self._next = min(places, key=lambda place: float(np.abs(self._references[place] - q).max()))

@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Shallow contact recovery: the reflex when the hand enters the table's field at a low angle.
 
-Claim: the reflex of MoBeE 1.0 recovers from steep contacts. The flatter the approach, the more often its recovery fails and control
-switches back and forth, since encoder noise decides what counts as contact. A filter and a dead time prevent most of that. MoBeE 2.0 lets
-the hand slide along the surface at any angle, and settles. Source: thesis 4.4 (discussion), which gives no numbers. Run time: 5 to 10
+Claim: the reflex of MoBeE 1.0 recovers from steep contacts.  The flatter the approach, the more often its recovery fails and control
+switches back and forth, since encoder noise decides what counts as contact.  A filter and a dead time prevent most of that.  MoBeE 2.0 lets
+the hand slide along the surface at any angle, and settles.  Source: thesis 4.4 (discussion), which gives no numbers.  Run time: 5 to 10
 minutes for 10 angles with 30 trials of each of four variants.
 
 A client drives the left hand at 20 % speed along a straight path through the surface of the table's field, from 6 cm before it to 4 cm
-behind it. For 12 s it tries again whenever it gets control back.  Motors have lag, delay, play and encoder noise; ticks of 10 ms.
+behind it.  For 12 s it tries again whenever it gets control back.  Motors have lag, delay, play and encoder noise; ticks of 10 ms.
 Variants: off = no reflex; naive = MoBeE 1.0 as chapter 4.1 describes it; mended = with filter and dead time; 2.0 = the client's references
 are attractors of the controller.  The first recovery of each trial counts.  It succeeds if the hand ends without contact, did not touch
-again or go deeper while it moved back, and the reflex does not start again within 0.3 s.  It is clean if in addition the encoders reported
-no contact during the motion back.
+again or sink deeper while it moved back, and the reflex does not start again within 0.3 s.  It is clean if in addition the encoders
+reported no contact during the motion back.
 """
 
 from __future__ import annotations
@@ -56,14 +56,14 @@ SWITCHING = ("naive", "mended")
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options --angles, --spots and --repeat."""
+    """Add the options --angles, --spots and --repeat to the parser."""
     parser.add_argument("--angles", nargs="+", type=positive_number, default=list(ANGLES), metavar="DEG", help="of the approach, degrees")
     parser.add_argument("--spots", type=positive_whole, default=10, metavar="N", help="places on the table (default: 10)")
     parser.add_argument("--repeat", type=positive_whole, default=3, metavar="N", help="trials at each place, other noise (default: 3)")
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return every angle at every place; each seed has its own places."""
+    """Return the conditions of the sweep: every angle at every spot.  Each seed has spots of its own."""
     angles, spots, repeat = arguments.angles, arguments.spots, arguments.repeat
     if arguments.quick:
         angles, spots, repeat = QUICK_ANGLES, min(spots, QUICK_SPOTS), min(repeat, QUICK_REPEAT)
@@ -75,7 +75,10 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Run all variants with several noises at a place; no trials if the hand has no path at the angle."""
+    """Run all variants with several noises at one spot and one angle.
+
+    Returns {"trials": the fields of `Trial` for each}; the list is empty if the hand has no path at this angle.
+    """
     table, spot, angle = _table(), settings["spot"], settings["angle"]
     path = table.path(_spots(settings["spots"], seed)[spot], np.deg2rad(angle))
     if path is None:
@@ -95,7 +98,11 @@ def _spots(count: int, seed: int) -> list[Spot]:
 
 
 class Truth:
-    """Records depths and the course of the first recovery, from the true joint positions."""
+    """Records the depths of contacts, and the course of the first recovery, from the true joint positions.
+
+    Its attributes mean the same as those of `Trial` with these names, except that `flips` is a number of changes, and `flicker` is in
+    ticks.
+    """
 
     def __init__(self, table: Table, path: HandPath) -> None:
         self._track = table.model.track()
@@ -112,7 +119,11 @@ class Truth:
         self._is_over = False
 
     def update(self, q: Array, seen: bool, reflex: Reflex | None) -> None:
-        """Record a tick: true joints q (n,) rad, whether the encoders reported a violation, and the reflex after the tick."""
+        """Record a tick.
+
+        `q`: true positions (n,) rad.  `seen`: whether the encoders reported a violation.  `reflex`: its state after the tick; None for
+        MoBeE 2.0.
+        """
         pose = self._track.evaluate(q)
         depths = {"solid": 0.0, "field": 0.0}
         for contact in pose.contacts:
@@ -130,7 +141,7 @@ class Truth:
             self._follow(reflex.recovery, depth)
 
     def finish(self) -> None:
-        """Evaluate the first recovery at the end of the trial."""
+        """Evaluate the first recovery at the end of the trial, if it has not ended before."""
         if not self._is_over and self._first is not None:
             self._conclude(self._first, self._depths[-1])
 
@@ -155,7 +166,16 @@ class Truth:
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """Measures of a trial."""
+    """Measurements of a trial.
+
+    `angle`: degrees.  `depth`: depth of the deepest contact, of fields or solids [m], by the true positions; `solid`: the same for solids.
+    `switches`: changes of control per second.  `flips`: changes between contact and no contact per second, by the encoders.  `flicker`:
+    time [s] from the first contact to the last pose without contact by the encoders, for variant "off".  `reflexes`: their number.
+
+    First recovery: `again`: contact returned, by the encoders; `came_back`: the same by the true positions; `never`: still in contact at
+    the end; `deeper`: the motion back was deeper than the stop; `relapse`: the next reflex started within 0.3 s.  `settled`: whether the
+    arm settled, for variant "2.0".  `progress`: largest distance [m] from the start along the table.
+    """
 
     variant: str
     angle: float  # degrees
@@ -177,17 +197,20 @@ class Trial:
 
     @property
     def recovered(self) -> bool:
-        """MoBeE 1.0: the first recovery succeeded."""
+        """Whether the first recovery succeeded (MoBeE 1.0 only)."""
         return self.reflexes > 0 and not (self.came_back or self.never or self.deeper or self.relapse)
 
     @property
     def clean(self) -> bool:
-        """MoBeE 1.0: the first recovery succeeded, and the encoders reported no contact during the motion back."""
+        """Whether the first recovery succeeded and the encoders reported no contact during the motion back (MoBeE 1.0 only)."""
         return self.recovered and not self.again
 
 
 def run_trial(table: Table, path: HandPath, variant: str, angle: float, spot: int, seed: int) -> Trial:
-    """Run a trial of SECONDS; `angle` in degrees only labels the path."""
+    """Run a trial of 12 s and return its measurements.
+
+    `variant`: "off", "naive", "mended" or "2.0".  `angle`: of the path, in degrees; only stored.  `seed`: of the encoder noise.
+    """
     client = Client(table.robot, path, DT)
     body = _Body(table, client.start, np.random.default_rng([seed, spot, 0x677A]))
     truth = Truth(table, path)
@@ -218,19 +241,19 @@ def run_trial(table: Table, path: HandPath, variant: str, angle: float, spot: in
 
 @dataclass(slots=True)
 class Control:
-    """The ticks at which the reflex took control, and gave it back."""
+    """The ticks at which the reflex took control (`taken`), and at which it gave control back to the client (`given`)."""
 
     taken: list[int] = field(default_factory=list)
     given: list[int] = field(default_factory=list)
 
     @property
     def switches(self) -> int:
-        """Number of changes of control."""
+        """The number of changes of control."""
         return len(self.taken) + len(self.given)
 
     @property
     def relapsed(self) -> bool:
-        """Whether the second reflex started within RELAPSE_TIME after the first."""
+        """Whether the second reflex started within 0.3 s (RELAPSE_TIME) after the first one gave control back."""
         return len(self.taken) > 1 and (self.taken[1] - self.given[0]) * DT <= RELAPSE_TIME
 
 
@@ -310,12 +333,12 @@ def _deflect(table: Table, client: Client, body: _Body, truth: Truth) -> bool:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the numbers of every variant at every angle, and whether the claim holds."""
+    """Return the results of the sweep, as of `results`."""
     return results(_trials(found))
 
 
 def results(trials: Sequence[Trial]) -> dict[str, Any]:
-    """Return the findings of trials."""
+    """Return the numbers of `summary` by variant and angle [degrees, as text], and "passed", whether the claim holds."""
     angles = sorted({trial.angle for trial in trials}, reverse=True)
     table: dict[str, Any] = {
         variant: {f"{angle:g}": summary([t for t in trials if (t.variant, t.angle) == (variant, angle)]) for angle in angles}
@@ -325,7 +348,10 @@ def results(trials: Sequence[Trial]) -> dict[str, Any]:
 
 
 def summary(trials: Sequence[Trial]) -> dict[str, float]:
-    """Summarise the trials of one variant at one angle: shares of trials, depths in mm."""
+    """Return the means and extremes over the trials of one variant at one angle.
+
+    Keys: "trials", their number; those of SHARES, means over the trials; depths in mm; "progress_cm".
+    """
     if not trials:
         return {"trials": 0}
 
@@ -343,7 +369,11 @@ def summary(trials: Sequence[Trial]) -> dict[str, float]:
 
 
 def holds(trials: Sequence[Trial]) -> bool:
-    """Return whether the claim holds: flat paths are worse than steep ones for 1.0 naive, mended is better there, and 2.0 settles."""
+    """Whether the claim holds.
+
+    For angles of at most 3 degrees, "naive" must recover less often than for steep angles, and "mended" more often and with fewer changes
+    of control than "naive".  At all angles, "2.0" must settle without contact of solids.
+    """
 
     def share(name: str, variant: str, low: bool) -> float:
         values = [getattr(t, name) for t in trials if t.variant == variant and (t.angle <= MAX_FLAT_ANGLE) == low]
@@ -361,7 +391,7 @@ def _trials(found: Cells) -> list[Trial]:
 
 
 def plot(found: Cells) -> Any:
-    """Draw recovery, switching, depth and progress against the angle of approach."""
+    """Return a figure of recovery, changes of control, depth and progress over the angle of approach."""
     trials = _trials(found)
     drawing = new_figure(10.0, 7.0)
     (success, switching), (depth, progress) = drawing.subplots(2, 2, sharex=True)

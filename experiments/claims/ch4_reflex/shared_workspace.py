@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """Two robots in one workspace: iCub and Katana babble beside each other, each protected on its own, under one model (thesis 4.1.2).
 
-Claim: robots that share a model and have a controller each do not collide.  Source: thesis 4.1.2: two reflexes, synchronised "by
-adjusting the control frequency. That is, the speed with which the reflex controller indexes through the history buffer"; then "the
-reflexive responses of both are synchronous, and the stochastic collection of training data runs robustly for hours".  No numbers.  Aim of
-this reproduction: with today's controllers no contact of solids between the robots deeper than 2 mm in an hour of robot time.
+Claim: robots that share a model and have a controller each do not collide.  Source: thesis 4.1.2: two reflexes, synchronised "by adjusting
+the control frequency. That is, the speed with which the reflex controller indexes through the history buffer"; then "the reflexive
+responses of both are synchronous, and the stochastic collection of training data runs robustly for hours".  No numbers.  Aim of this
+reproduction: with today's controllers no contact of solids between the robots deeper than 2 mm in an hour of robot time.
 
 Each robot gets random postures over its whole range at 20 % speed (23 motors of the iCub, 6 of the Katana), the same in all conditions.
-Protections: none; a reflex for each robot with its own history and waypoints, at the same pace or with the Katana's a quarter as
-fast; one reflex with one history of both robots; a controller for each robot.  A reflex is triggered by contacts of its robot's fields and
-solids, its limits and clauses.  Motors have lag, delay, play and encoder noise; ticks of 10 ms; all in one process.  Contacts are those of
-the true posture, by the model; solids do not stop each other.  The controllers have the gains of their robots: the default ones, and those
-for derived fields.  Widths and gains were chosen with seeds 0 to 4 in view; the record has seeds from 100 on.  A collision is a contact of
-solids of both robots deeper than 2 mm.
-Run time: three minutes on one core for an hour of robot time with controllers, and 20 minutes with each other protection.
+Protections: none; a reflex for each robot with its own history and waypoints, both equally fast or the Katana's a quarter as fast; one
+reflex with one history of both robots; a controller for each robot.  A reflex is triggered by contacts of its robot's fields and solids,
+its limits and clauses.  Motors have lag, delay, play and encoder noise; ticks of 10 ms; all in one process.  Contacts are those of the true
+posture, by the model; solids do not stop each other.  The controllers have the gains of their robots: the default ones, and those for
+derived fields.  Widths and gains were chosen with seeds 0 to 4 in view; the record has seeds from 100 on.  A collision is a contact of
+solids of both robots deeper than 2 mm.  Run time: three minutes on one core for an hour of robot time with controllers, and 20 minutes with
+each other protection.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ Groups = Mapping[str, Sequence[Mapping[str, Any]]]
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the robot time."""
+    """Add the option --minutes, the robot time of a trial, to the parser."""
     parser.add_argument(
         "--minutes",
         type=positive_number,
@@ -56,7 +56,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return a condition for each protection."""
+    """Return a condition of the sweep for each protection (the keys of PROTECTIONS)."""
     minutes = QUICK_MINUTES if arguments.quick else arguments.minutes
     return [
         Condition(
@@ -73,7 +73,7 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Let both robots babble."""
+    """Let both robots babble under a protection, and return the result of `shared_workspace_trial.run_trial`."""
     return run_trial(settings["protection"], settings["minutes"], settings["paces"], seed)
 
 
@@ -127,7 +127,11 @@ CLAIMS = (controllers, reflexes, out_of_step)
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return a row for each protection, and the claims; "own": the deepest contact of a robot with itself or the table."""
+    """Return the results of the sweep.
+
+    Keys: "protections", the numbers of each protection; "claims", the judged claims.  "own, mm" is the depth of the deepest contact of a
+    robot with itself or the table.
+    """
     groups = grouped(found, "condition", tuple(PROTECTIONS))
     rows = {
         name: {
@@ -145,7 +149,7 @@ def findings(found: Cells) -> dict[str, Any]:
 
 
 def plot(found: Cells) -> Any:
-    """Draw collisions and the deepest contact of each run, by protection."""
+    """Return a figure of the collisions per hour, and of the deepest contact of each run, for each protection."""
     groups = grouped(found, "condition", tuple(PROTECTIONS))
     drawing = new_figure(9.0, 3.4)
     left, right = drawing.subplots(1, 2)

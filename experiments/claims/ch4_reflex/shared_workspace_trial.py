@@ -30,16 +30,27 @@ MARK = "katana_"  # begins the names of the Katana's shapes, motors and parts
 
 
 class Protected(Protocol):
-    """A robot's client and its protection."""
+    """A client of one robot together with the protection of that robot.
+
+    `mode`: the kind of its commands, "position" or "velocity".
+    """
 
     mode: Mode
 
     def command(self, k: int, q: Array, pose: Pose) -> Array:
-        """Return the references (n_own,) of its motors for tick k, at the encoders q (n,) rad of both robots and their pose."""
+        """Return the commands (n_own,) of the robot's own motors for tick `k`, in rad or rad/s as `mode` says.
+
+        `q`: encoder values (n,) rad of both robots.  `pose`: the model's evaluation of `q`.
+        """
 
 
 class Client:
-    """Sends one position move after the other: postures at random, each from where the robot is."""
+    """Commands random postures to one robot, one position move after the other.  `moves`: number of postures so far.
+
+    Args:
+        own: slice of the robot's motors among those of both robots.
+        seed: of the postures.
+    """
 
     def __init__(self, own: slice, seed: int) -> None:
         robot = two_robots()
@@ -50,25 +61,25 @@ class Client:
         self._move = PositionMove(robot.home[own], robot.home[own], self._speed)
 
     def next(self) -> Array:
-        """Return the next posture (n_own,) rad."""
+        """Return the next random posture (n_own,) rad, and count it in `moves`."""
         self.moves += 1
         return self._targets.next()[self._own]
 
     def start(self, k: int, here: Array) -> None:
-        """Begin the next position move at a posture (n_own,) rad."""
+        """Begin a position move to the next random posture in tick `k`.  `here`: posture (n_own,) rad in which it starts."""
         self._begin, self._move = k, PositionMove(here, self.next(), self._speed)
 
     def is_over(self, k: int) -> bool:
-        """Return whether the move has ended."""
+        """Whether the present move and the rest of 1 s after it have ended in tick `k`."""
         return (k - self._begin) * DT >= self._move.duration + REST
 
     def reference(self, k: int) -> Array:
-        """Return the reference (n_own,) rad of tick k."""
+        """Return the reference positions (n_own,) rad of the present move in tick `k`."""
         return self._move.at((k - self._begin) * DT)
 
 
 class Unprotected:
-    """A client alone."""
+    """A client without any protection; the commands are its reference positions."""
 
     mode: Mode = "position"
 
@@ -76,14 +87,17 @@ class Unprotected:
         self._client = Client(own, seed)
 
     def command(self, k: int, q: Array, pose: Pose) -> Array:
-        """See `Protected`."""
+        """Return the reference positions (n_own,) rad of the client for tick `k`; see `Protected.command`."""
         if self._client.is_over(k):
             self._client.start(k, self._client.reference(k))
         return self._client.reference(k)
 
 
 class WithReflex:
-    """A client and the reflex of the first MoBeE, which retraces the robot's own poses at a violation of its own."""
+    """A client and the reflex of MoBeE 1.0, which moves the robot back along its recent poses after a violation.
+
+    `watch`: returns the violations that trigger the reflex in a pose.
+    """
 
     mode: Mode = "position"
 
@@ -95,7 +109,10 @@ class WithReflex:
         self._was_cut = True
 
     def command(self, k: int, q: Array, pose: Pose) -> Array:
-        """See `Protected`."""
+        """Return the positions (n_own,) rad for tick `k`: those of the reflex while it has control, else the client's references.
+
+        See `Protected.command`.
+        """
         mine, violations = q[self._own], self._watch(pose)
         target = self.reflex.tick(mine, violations)
         if self.reflex.state != "stuck":
@@ -114,7 +131,7 @@ class WithReflex:
 
 
 class WithController:
-    """A client and a controller of today's MoBeE, which moves the robot's own motors; postures are attractors."""
+    """A client and a controller of MoBeE 2.0, which moves only the robot's own motors; the random postures are its attractors."""
 
     mode: Mode = "velocity"
 
@@ -128,7 +145,10 @@ class WithController:
         self._next(0.0)
 
     def command(self, k: int, q: Array, pose: Pose) -> Array:
-        """See `Protected`."""
+        """Return the velocities (n_own,) rad/s that the controller commands in tick `k`; see `Protected.command`.
+
+        When the motion has settled or timed out, the next posture becomes the attractor.
+        """
         controller, own = self._controller, self._own
         velocity = controller.step(q, DT, pose=pose).velocity[own]
         if self._test.update(k * DT, controller.velocity[own], controller.acceleration[own]) != "moving":
@@ -143,9 +163,11 @@ class WithController:
 
 @dataclass(slots=True)
 class Truth:
-    """The contacts of solids of the true posture: between the robots, and of a robot with itself or the table.
+    """Records the contacts of the true postures of two robots.
 
-    `collisions`: contacts between the robots that became deeper than DEEP; `deepest`, `deepest_own`: m; `path`: rad, of all motors.
+    `collisions`: number of contacts of solids between the robots that became deeper than DEEP (2 mm).  `deepest`: depth of the deepest one
+    [m].  `deepest_own`: the same for a robot with itself or the table [m].  `path`: length of the paths of all motors, summed [rad].
+    `near`: number of contacts between the robots that concern fields, summed over all ticks.
     """
 
     collisions: int = 0
@@ -157,7 +179,7 @@ class Truth:
     _last: Array | None = None
 
     def note(self, pose: Pose) -> None:
-        """Take the pose of one tick."""
+        """Record the pose of one tick."""
         now = set[tuple[str, str]]()
         if len(pose.contacts):
             for contact in pose.contacts:
@@ -179,13 +201,16 @@ class Truth:
 
 
 def is_between(first: str, second: str) -> bool:
-    """Return whether a contact is one between the two robots; objects of the world are of no robot."""
+    """Whether a contact of two shapes, given by their names, is one between the two robots.  Objects of the world belong to no robot."""
     shapes = {shape.name for shape in two_robots().shapes}
     return second in shapes and first.startswith(MARK) != second.startswith(MARK)
 
 
 def watch_of(robots: Sequence[str]) -> Callable[[Pose], list[Violation]]:
-    """Return a check of a pose that gives the violations of one robot or both: contacts with its shapes, its limits, its clauses."""
+    """Return a function that returns the violations in a pose that concern the given robots.
+
+    `robots`: "icub", "katana" or both.  Violations are contacts with their shapes, limits and clauses.
+    """
     watch, model = Watch(two_robots()), Model(two_robots(), load_world("table"))
     always = {one.what for one in watch.check(model.evaluate(two_robots().home))}  # the Katana's base on the table
 
@@ -203,7 +228,11 @@ def _is_of(robot: str, violation: Violation) -> bool:
 
 
 def babble(makers: Sequence[tuple[slice, Protected]], model: Model, minutes: float, seed: int) -> Truth:
-    """Run both robots for a time; a command that was computed from the encoders of tick k moves the motors from tick k + 1 on, as live."""
+    """Simulate both robots for `minutes` of robot time, and return the record of their contacts.
+
+    `makers`: for each protection, the slice of its motors and the protection.  A command that is computed from the encoders of tick k moves
+    the motors from tick k + 1 on, as in the live system.
+    """
     robot, parameters, truth = two_robots(), MotorParameters(), Truth()
     motors = Motors(robot, parameters, seed, robot.home)
     substeps = parameters.substeps(DT)
@@ -220,9 +249,11 @@ def babble(makers: Sequence[tuple[slice, Protected]], model: Model, minutes: flo
 
 
 def run_trial(protection: str, minutes: float, paces: Sequence[float], seed: int) -> dict[str, float]:
-    """Let both robots babble under a protection: "none", "reflexes", "one reflex" or "controllers"; returns what happened.
+    """Let both robots babble under a protection, and return the measurements.
 
-    `paces`: recorded poses that the reflexes of iCub and Katana retrace per tick.
+    `protection`: "none", "reflexes", "one reflex" or "controllers".  `minutes`: robot time.  `paces`: number of recorded poses per tick
+    that the reflexes of iCub and Katana retrace.  Keys: "minutes", the fields of `Truth`, and "reflexes" and "stuck", counts of reflexes
+    and of stuck ones.
     """
     model = Model(two_robots(), load_world("table"))
     model.world.set_role("ball", "ghost")

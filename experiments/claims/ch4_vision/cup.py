@@ -1,22 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
 """The cup: reach a pre-grasp beside a cup among clutter, close the hand, lift the cup and put it down elsewhere, in MuJoCo.
 
-Claim: adaptive roadmap planning "works well in practice, generating reaches to objects"; pictures of a cup, no numbers; it stops before the
-grasp.  Source: thesis 4.3.3, figs. 4.8 and 4.9.  Our goals: at least 90 % of the placements end in a pre-grasp within 2 cm and 15 degrees
-with nothing knocked over, and at least 75 % lift and place.
+Claim: adaptive roadmap planning "works well in practice, generating reaches to objects".  Source: thesis 4.3.3, figs. 4.8 and 4.9.
+Published: pictures of a cup, no numbers, and no grasp.  Our goals: at least 90 % of the placements end in a pre-grasp within 2 cm and 15
+degrees with nothing knocked over, and at least 75 % lift and place.
 
 A seed draws the place of the cup (5.6 cm wide, 13 cm high, 150 g) and 0 to 3 pieces of clutter; the first piece is not seen by the cameras.
 Placements without room for the open hand beside the cup are drawn again.  Cup and clutter move when they are pushed.  Seen places have
-errors of 2 mm along each axis.  One process: model, controller with the default gains and MuJoCo in ticks of 10 ms, motors with lag,
-delay, play and encoder noise, finger motors of 0.3 and 0.09 N m.  The hand is not pushed by the fields of the cup and what is seen of the
-clutter, as in a reach; a jump of the torques of shoulder and waist is a bump: the arm moves back, and the next plan leads around or over
-that place of the palm.
+errors of 2 mm along each axis.  Everything runs in one process: the model, the controller with the default gains, and MuJoCo in ticks of 10
+ms.  The motors have lag, delay, play and encoder noise; the finger motors have 0.3 and 0.09 N m.  The fields of the cup and of the seen
+clutter do not push the hand, as in a reach.  A jump of the torques of shoulder and waist is a bump: the arm moves back, and the next plan
+leads around or over that place of the palm.
 
 Planners of the path to the pre-grasp: the map of pre-grasps (A* over free edges); the learned reacher, which has learned 300 problem-tries
 on the offline plant without clutter, and moves the arm alone; inverse kinematics with RRT-Connect of OMPL.  Grasp, lift and placing are the
 same for all.
-The numbers of grip, bump and motions were chosen with seeds below 520 in view; results are of seeds from 520 on.
-Run time: 5 s of processor time for a trial.  Needs the extras `sim` and `planning`.
+
+The numbers of grip, bump and motions were chosen with seeds below 520 in view; results are of seeds from 520 on.  Run time: 5 s of
+processor time for a trial.  Needs the extras `sim` and `planning`.
 """
 
 from __future__ import annotations
@@ -45,13 +46,13 @@ Runs = Sequence[Mapping[str, Any]]
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return a condition for each planner."""
+    """Return a condition of the sweep for each planner."""
     seeds = tuple(range(arguments.seed, arguments.seed + QUICK)) if arguments.quick else ()
     return [Condition(name, {"method": name}, seeds=seeds) for name in METHODS]
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Make one trial."""
+    """Make one trial with the planner `settings["method"]`; returns its measurements."""
     return run_trial(settings["method"], seed)
 
 
@@ -75,7 +76,11 @@ def _reasons(runs: Runs) -> dict[str, int]:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return a row for each planner, and why trials ended early; `planning`: processor time of all plans of a trial."""
+    """Return the results of the sweep.
+
+    Keys: "planners", the numbers of each planner; "ended", how often each reason ended a trial early; "claims", the judged claims.
+    "planning, ms" is the processor time of all plans of a trial, median.
+    """
     rows: dict[str, Any] = {}
     reasons: dict[str, Any] = {}
     groups = grouped(found, "method", tuple(METHODS))
@@ -130,7 +135,7 @@ CLAIMS = (
 
 
 def plot(found: Cells) -> Any:
-    """Draw shares of success, and the distances and angles of the palm at the pre-grasp."""
+    """Return a figure of the shares of success, and of the distances and angles of the palm at the pre-grasp, for each planner."""
     groups = grouped(found, "method", tuple(METHODS))
     drawing = new_figure(9.0, 3.4)
     left, right = drawing.subplots(1, 2)

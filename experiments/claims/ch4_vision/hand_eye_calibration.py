@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Calibration of imperfect cameras by looking at the own hand (thesis 4.1.2): errors of a ball's position before and after.
+"""Calibration of imperfect cameras by looking at the robot's own hand (thesis 4.1.2): errors of a ball's position before and after.
 
-Claim: a robot calibrates its cameras by looking at its own hand, and knows how well.
-Source: thesis 4.1.2 lets two robots look at each other's world, without numbers for calibrated stereo.  Aims of this reproduction: after
-`mobee calibrate` the position of a ball is wrong by at most 5 mm (median) and 15 mm (95 %), over 500 random gazes and places (100 for each
-of 5 robots), with cameras displaced by up to 2 cm and 2 deg and head encoders that are wrong by up to 1 deg; and the reported covariance is
-honest: the normalised error is within its 95 % band for 90 to 98 % of the places.
+Claim: a robot calibrates its cameras by looking at its own hand, and knows how well.  Source: thesis 4.1.2 lets two robots look at each
+other's world, without numbers for calibrated stereo.  Aims of this reproduction: after `mobee calibrate` the position of a ball is wrong by
+at most 5 mm (median) and 15 mm (95 %), over 500 random gazes and places (100 for each of 5 robots), with cameras displaced by up to 2 cm
+and 2 deg and head encoders that are wrong by up to 1 deg; and the reported covariance is honest: the normalised error is within its 95 %
+band for 90 to 98 % of the places.
 
 A trial draws the errors of one robot, calibrates it by 40 postures of its hand, and then shows it balls.  All pictures are rendered with
-distortion, noise and motion blur, in a cluttered room.  "Before" is the same sightings with the model's own cameras.  Of sightings that
-both have, the position is the point nearest to both rays before, and that of the outlines (`mobee.vision.objects`) after.
-Run time: one minute a robot on one core.
+distortion, noise and motion blur, in a cluttered room.  "Before" is the same sightings with the model's own cameras.  Only sightings for
+which both positions can be computed count: before the calibration, the point nearest to both rays; after it, the position by the outlines
+(`mobee.vision.objects`).  Run time: one minute a robot on one core.
 """
 
 from __future__ import annotations
@@ -67,25 +67,29 @@ Groups = Mapping[str, Sequence[Mapping[str, Any]]]
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the number of places."""
+    """Add the option --places, the number of places of the ball, to the parser."""
     parser.add_argument("--places", type=positive_whole, default=PLACES, metavar="N", help="places of the ball (default: %(default)s)")
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return the only condition of the sweep."""
+    """Return the only condition of the sweep: calibration by the hand."""
     numbers = (QUICK_POSTURES, QUICK_PLACES) if arguments.quick else (POSTURES, arguments.places)
     return [Condition("hand", {"calibration": "hand", "postures": numbers[0], "places": numbers[1]})]
 
 
 @cache
 def rig() -> Rig:
-    """Return the iCub with a tag on its left palm."""
+    """Return the iCub with its cameras and a tag on its left palm."""
     robot = load_robot("icub")
     return Rig(robot, cameras_of(robot), CameraSettings().lens, Tag("left_palm"))
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Calibrate one robot, and show it balls; returns errors [m] and normalised errors."""
+    """Draw the camera errors of one robot, calibrate it by its hand, and show it balls.
+
+    Main keys: "before" and "after", errors of the ball's position (N,) m; "normalised", squared errors normalised by the covariance (N,);
+    "hand_before" and "hand_after", median errors of the hand [m]; "normalised_parameters", the normalised error of the calibration.
+    """
     chosen, model = CameraSettings(samples=2), Model(rig().robot, load_world("table"))
     errors = camera_errors(chosen, rig().robot, list(rig().cameras), seed)
     postures = choose_postures(rig(), model, chosen, "left_arm", settings["postures"], seed)
@@ -162,7 +166,10 @@ def _middle(name: str, balls: Sequence[Sighting], found: Calibration, moment: Mo
 
 
 def random_gaze(rng: np.random.Generator) -> tuple[Array, Array]:
-    """Draw a posture (n,) rad of the head and a place (3,) m of the ball that the model's own cameras would have in both pictures."""
+    """Draw a random posture of the head and a position of the ball that both cameras would see.
+
+    Returns the posture (n,) rad and the position (3,) m, root frame.  The cameras are those of the model, without errors.
+    """
     robot = rig().robot
     low, high = robot.limits[list(rig().head)].T
     while True:
@@ -214,7 +221,7 @@ CLAIMS = (accuracy, honest)
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return a row for each robot, and the claims."""
+    """Return the results of the sweep.  Keys: "runs", the numbers of each robot; "claims", the judged claims."""
     groups = grouped(found, "calibration", ("hand",))
     band = chi_squared(0.95, 3)
     rows = {
@@ -235,7 +242,10 @@ def findings(found: Cells) -> dict[str, Any]:
 
 
 def plot(found: Cells) -> Any:
-    """Draw the distributions of the error before and after, and of the normalised error, compared with that of a correct covariance."""
+    """Return a figure of the distributions of the position error before and after, and of the normalised error.
+
+    The latter is drawn beside the distribution that a correct covariance has.
+    """
     runs = grouped(found, "calibration", ("hand",))["hand"]
     drawing = new_figure(9.0, 3.6)
     left, right = drawing.subplots(1, 2)

@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Ball, cup and box seen by imperfect, calibrated cameras: errors of their positions, their covariances, and false objects.
 
-Claim: a robot that has calibrated its cameras by looking at its own hand places ball, cup and box within millimetres, knows how well,
-and sees nothing where nothing is.
-Source: thesis 4.3.3 puts into the world what the eyes see, without numbers.  Aims of this reproduction: over random gazes and places the
-error is at most 5 mm (median) and 15 mm (95 %); the normalised error is within its 95 % band for 90 to 98 % of the places; and no false
-object is reported in 10 minutes, at 15 pictures a second, before an empty table with paper of the colours of the things.
+Claim: a robot that has calibrated its cameras by looking at its own hand places ball, cup and box within millimetres, knows how well, and
+sees nothing where nothing is.  Source: thesis 4.3.3 puts into the world what the eyes see, without numbers.  Aims of this reproduction:
+over random gazes and places the error is at most 5 mm (median) and 15 mm (95 %); the normalised error is within its 95 % band for 90 to 98
+% of the places; and no false object is reported in 10 minutes, at 15 pictures a second, before an empty table with paper of the colours of
+the things.
 
 A trial draws the errors of one robot and calibrates it by 40 postures of its hand.  Then it shows ball, cup and box side by side in random
 places, each thing upright and with a random angle, and looks once: what is hidden by another thing or an arm may be missed.  All pictures
 are rendered with distortion, noise and motion blur, in a cluttered room.  For the last claim the things are taken away, and the head looks
-around: 15 pictures with each of many random gazes, followed by the tracker as in the live system.
-Run time: five minutes a robot on one core.
+around: 15 pictures with each of many random gazes, followed by the tracker as in the live system.  Run time: five minutes a robot on one
+core.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ Groups = Mapping[str, Sequence[Mapping[str, Any]]]
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the numbers of gazes and of looks, and the detector."""
+    """Add the options --gazes, --looks and --detector to the parser."""
     parser.add_argument("--gazes", type=positive_whole, default=GAZES, metavar="N", help="gazes at the things (default: %(default)s)")
     parser.add_argument("--looks", type=positive_whole, default=LOOKS, metavar="N", help="pictures without things (default: %(default)s)")
     text = f"detector: {COLOR}, or a file of `mobee detector train` (default: %(default)s)"
@@ -84,7 +84,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return the only condition of the sweep."""
+    """Return the only condition of the sweep: ball, cup and box on the table."""
     numbers = (QUICK_POSTURES, QUICK_GAZES, QUICK_LOOKS) if arguments.quick else (POSTURES, arguments.gazes, arguments.looks)
     settings = {"world": "things", "postures": numbers[0], "gazes": numbers[1], "looks": numbers[2]}
     if arguments.detector != COLOR:  # records from before there was a choice do not name it
@@ -93,7 +93,17 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 class Robot:
-    """A calibrated robot before its table, which looks at things."""
+    """A calibrated robot at its table, whose cameras look at things.
+
+    `things`: what it can recognise.  `pictures`: number of pictures so far.  `regions`: number of detected regions in them.  `seconds`:
+    processor time of the detector [s].
+
+    Args:
+        world: name of the world with the things.
+        postures: number of postures of the hand for the calibration.
+        seed: of camera errors, noise and gazes.
+        detector: "color", or the file of a trained detector.
+    """
 
     def __init__(self, world: str, postures: int, seed: int, detector: str = COLOR) -> None:
         self._settings, model = CameraSettings(samples=2), Model(rig().robot, load_world("table"))
@@ -115,15 +125,18 @@ class Robot:
         return scene, Cameras(scene, self._settings, errors, seed)
 
     def gaze(self) -> tuple[Array, Array]:
-        """Return a random posture (n,) rad and a place (3,) m in both pictures."""
+        """Return a random posture (n,) rad, and a position (3,) m, root frame, that is in both pictures in this posture."""
         return random_gaze(self._rng)
 
     def put(self, name: str, position: Array, yaw: float) -> None:
-        """Put a thing somewhere, upright."""
+        """Put a thing upright at a position (3,) m, root frame.  `yaw`: its angle about the vertical axis [rad]."""
         self._scene.place(name, position, np.array([np.cos(0.5 * yaw), 0.0, 0.0, np.sin(0.5 * yaw)]))
 
     def arrange(self, about: Array) -> dict[str, tuple[Array, float]]:
-        """Put all things side by side about a place, at or above the table; returns position (3,) m and angle of each."""
+        """Put all things side by side around a position `about` (3,) m, root frame, at the height of the table or above it.
+
+        Returns the position (3,) m and the angle [rad] of each thing, by name.
+        """
         found: dict[str, tuple[Array, float]] = {}
         top = max(item.position[2] + 0.5 * item.size[2] for item in self._solids)
         for thing in self.things:
@@ -137,7 +150,10 @@ class Robot:
         return found
 
     def look(self, q: Array) -> tuple[Eyes, list[Placed]]:
-        """Return the cameras as the robot assumes them at a posture q (n,) rad, and what it sees."""
+        """Take pictures in a posture `q` (n,) rad.
+
+        Returns the cameras as the calibrated robot assumes them, and the things that it sees.
+        """
         noise = ENCODER / np.sqrt(READINGS)
         moment = Moment(q + noise * self._rng.standard_normal(len(q)), np.zeros(len(q)), np.full(len(q), noise**2))
         eyes = eyes_at(rig(), self._found.x, moment, self._found.covariance, self._settings.jitter)
@@ -151,7 +167,11 @@ class Robot:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Calibrate one robot, and show it things, and then none; returns errors and counts."""
+    """Calibrate one robot, show it things, and then an empty table.
+
+    For each thing: "NAME_error" (N,) m, "NAME_normalised" (N,) and "NAME_size" (N, g), relative errors of its sizes.  Also "box_angle" (N,)
+    rad, and counts: "false_objects" (reported by the tracker), "false_places" (in single looks) and others.
+    """
     robot = Robot(settings["world"], settings["postures"], seed, settings.get("detector", COLOR))
     return {**_with_things(robot, settings["gazes"]), **_without(robot, settings["looks"])}
 
@@ -249,7 +269,7 @@ CLAIMS = (accuracy, honest, nothing_false)
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return a row for each robot, and the claims, which are those of the detector by colour."""
+    """Return the results of the sweep.  Keys: "runs", the numbers of each robot; "claims", judged only for the detector by colour."""
     groups = grouped({name: cell for name, cell in found.items() if "detector" not in cell.cell.settings}, "world", ("things",))
     return {"runs": {name: _row(cell.values) for name, cell in found.items()}, "claims": judged(CLAIMS, groups, bool(groups))}
 
@@ -277,7 +297,10 @@ def _row(run: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def plot(found: Cells) -> Any:
-    """Draw the distributions of the errors of each thing, and of the normalised error, compared with that of a correct covariance."""
+    """Return a figure of the distributions of the position errors and of the normalised errors of each thing.
+
+    The latter are drawn beside the distribution that a correct covariance has.
+    """
     runs = grouped(found, "world", ("things",))["things"]
     drawing = new_figure(9.0, 3.6)
     left, right = drawing.subplots(1, 2)

@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Robots teaching robots: a Katana carries a ball to places that it knows, and the iCub learns to place what it sees (thesis 4.1.2).
 
-Claim: a robot with uncalibrated cameras learns from another robot where things are.  Source: thesis 4.1.2 and Leitner et al. 2012
-(doi 10.5772/54657: neural network and genetic programming, from the pixels in both cameras and the encoders, "in the centimetre range"; no
+Claim: a robot with uncalibrated cameras learns from another robot where things are.  Source: thesis 4.1.2 and Leitner et al. 2012 (doi
+10.5772/54657: neural network and genetic programming, from the pixels in both cameras and the encoders, "in the centimetre range"; no
 camera calibration and no kinematic model).  Aim of this reproduction: on held-out poses the learned localiser is at least three times
 better than stereo by the uncalibrated cameras.
 
-A trial draws the errors of one iCub's cameras and head encoders, as in hand-eye-calibration.  The Katana carries a red ball, which stands
-for the children's block, to random places 20 to 65 cm from the eyes; for each, the iCub looks from random postures of torso, head and
-eyes.  Both move on the offline plant under one model, kept apart by the controller; pictures are rendered with distortion and noise, in a
-room without clutter on the table.  The Katana reports the place by its own encoders.  A fifth of the Katana's poses is held out: no
-localiser learns from any picture of them.  Beside the localisers: stereo by the model's own cameras, and by cameras that were calibrated
-by 20 postures of the hand.  Errors are distances from the ball's true place; the error of a robot is its median.
-Run time: about three minutes a robot on one core.
+A trial draws the errors of one iCub's cameras and head encoders, as in hand-eye-calibration.  The Katana carries a red ball (the thesis: a
+children's block) to random places 20 to 65 cm from the eyes; for each, the iCub looks from random postures of torso, head and eyes.  Both
+move on the offline plant under one model, kept apart by the controller; pictures are rendered with distortion and noise, in a room without
+clutter on the table.  The Katana reports the place by its own encoders.  A fifth of the Katana's poses is held out: no localiser learns
+from any picture of them.  The localisers are compared with stereo by the model's own cameras, and with stereo by cameras that were
+calibrated by 20 postures of the hand.  Errors are distances from the ball's true place; the error of a robot is its median.  Run time:
+about three minutes a robot on one core.
 """
 
 from __future__ import annotations
@@ -62,19 +62,23 @@ Groups = Mapping[str, Sequence[Mapping[str, Any]]]
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return the only condition of the sweep."""
+    """Return the only condition of the sweep: the Katana as teacher."""
     poses, looks, postures = QUICK if arguments.quick else (POSES, LOOKS, POSTURES)
     return [Condition("katana", {"teacher": "katana", "poses": poses, "looks": looks, "postures": postures})]
 
 
 @cache
 def rig() -> Rig:
-    """Return both robots with the iCub's eyes."""
+    """Return iCub and Katana as one robot, with the cameras of the iCub."""
     return Rig(two_robots(), cameras_of(two_robots()), CameraSettings().lens)
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Teach one robot; returns the errors (N,) m of stereo and of all localisers on the held-out poses, and learning curves."""
+    """Let the Katana teach one iCub, and measure all localisers on the held-out poses.
+
+    Main keys: "errors, NAME", distances (N,) m from the true positions, for stereo and each localiser; "curves", median errors [m] of each
+    localiser by number of lessons, which are in "counts"; "robot_seconds", robot time of the teaching [s].
+    """
     lessons, time = taught(settings["poses"], settings["looks"], seed)
     learned, held_out = split_by_pose(lessons.poses, HELD_OUT, seed)
     test = lessons[held_out]
@@ -98,7 +102,10 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def taught(poses: int, looks: int, seed: int) -> tuple[Lessons, float]:
-    """Let the Katana teach the iCub of a seed; returns the lessons, and the robot time [s] that they took."""
+    """Let the Katana teach the iCub of a seed: `poses` postures of the Katana, with `looks` looks of the iCub at each.
+
+    Returns the lessons (pixels, encoders and reported positions), and the robot time [s] that they took.
+    """
     chosen, world = CameraSettings(samples=2), load_world("table")
     world.set_role("ball", "ghost")  # it is drawn where the Katana holds it
     model = Model(rig().robot, world)
@@ -198,7 +205,10 @@ CLAIMS = (corrected, model_free, network, programs)
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return a row for each way to place the ball, one for each robot, and the claims."""
+    """Return the results of the sweep.
+
+    Keys: "localisers", the errors of stereo and of each localiser; "robots", the numbers of each robot; "claims", the judged claims.
+    """
     groups = grouped(found, "teacher", ("katana",))
     runs = groups.get("katana", [])
     rows = {
@@ -229,7 +239,7 @@ def findings(found: Cells) -> dict[str, Any]:
 
 
 def plot(found: Cells) -> Any:
-    """Draw the errors of all ways to place the ball, and how they fall with the number of lessons."""
+    """Return a figure of the errors of stereo and of all localisers, and of their medians over the number of lessons."""
     groups = grouped(found, "teacher", ("katana",))
     runs = groups["katana"]
     drawing = new_figure(9.5, 4.2)

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Constraint violations: a search for the command that violates the cable rows or the forearm clauses most.
 
-Claim: with the default gains no attractors, inside or far outside the joint box, held or in any sequence, carry an arm more than
-2 degrees beyond a constraint (-s/|a|, along the normal).  The fastest impact of a motor at a hard stop is reported too.
-Source: this project's goal; the constraints are those of thesis 5.2.5.  Published: no number; the thesis says of positional constraints
-that their forces may grow without bound, "but this never happens in practice".  Run time: 10 000 tries for both gain sets
-and 2000 with forces of a client, a few minutes.
+Claim: with the default gains no attractors, inside or far outside the joint box, held or in any sequence, carry an arm more than 2 degrees
+beyond a constraint (-s/|a|, along the normal).  The fastest impact of a motor at a hard stop is reported too.  Source: this project's goal;
+the constraints are those of thesis 5.2.5.  Published: no number; the thesis says of positional constraints that their forces may grow
+without bound, "but this never happens in practice".  Run time: 10 000 tries for both gain sets and 2000 with forces of a client, a few
+minutes.
 
-A try is one arm's command: a start, three attractors, how long each is in force, and, in the part called "forced", a force in
-configuration space and one at the palm with each.  Both arms try at once while the torso moves to a random posture, with a table in
-front; the motors are those of the published findings.  The first part of the tries is random; the others vary and cross the worst
+A try is one arm's command: a start, three attractors, and how long each is in force.  In the part called "forced" it has in addition, for
+each attractor, a force in configuration space and one at the palm.  Both arms try at once while the torso moves to a random posture, with a
+table in front; the motors are those of the published findings.  The first part of the tries is random; the others vary and cross the worst
 commands so far for every clause.  The forced tries are not part of the claim: there the client pushes with the largest force.
 """
 
@@ -46,14 +46,14 @@ DASHES = {False: "-", True: ":"}
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add gains and numbers of tries."""
+    """Add the options --gains, --tries and --forced-tries to the parser."""
     parser.add_argument("--gains", nargs="+", choices=GAINS, default=list(GAINS), metavar="SET", help=f"of {', '.join(GAINS)}")
     parser.add_argument("--tries", type=positive_whole, default=10_000, metavar="N", help="tries per gain set (default: 10000)")
     parser.add_argument("--forced-tries", type=positive_whole, default=2_000, metavar="N", help="with forces of a client (default: 2000)")
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return each gain set without and with forces of a client."""
+    """Return the conditions of the sweep: each gain set, without and with forces of a client."""
     found = []
     for gains in arguments.gains:
         for kind, given in zip(KINDS, (arguments.tries, arguments.forced_tries), strict=True):
@@ -64,7 +64,14 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 @dataclass
 class Search:
-    """The state of a search.  Violations are degrees along the normal, the largest so far, negative inside."""
+    """The state of a search for the largest violation of a constraint.
+
+    Violations are degrees along the normal of the constraint, the largest so far, negative inside.  `gains`: name of the gain set.
+    `forced`: whether a client pushes.  `tries`: number so far.  `worst`: of all tries; `by_clause`: of each clause.  `stop`: fastest impact
+    at a hard stop [deg/s].  `course`: pairs of tries and largest violation so far.  `inside`: of each generation of tries, with attractors
+    inside the joint box; `random`: of each random generation.  `elite`: for each clause, the worst commands.  `worst_try`: what is needed
+    to repeat the worst try.
+    """
 
     gains: str
     forced: bool
@@ -81,12 +88,15 @@ class Search:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Run one search."""
+    """Run one search, and return its final state as a dict with the fields of `Search`."""
     return asdict(search(settings["gains"], settings["forced"], settings["tries"], seed))
 
 
 def search(gains: str, forced: bool, tries: int, seed: int) -> Search:
-    """Search with random tries first, then with variations of the worst commands of each clause."""
+    """Search for large violations: first by random tries, then by variations of the worst commands of each clause.
+
+    `gains`: name of the gain set.  `forced`: whether a client pushes.  `tries`: their number.  Returns the final state.
+    """
     state, numbers = Search(gains, forced, seed), Gains.named(gains)
     while state.tries < tries:
         rng = np.random.default_rng([seed, forced, state.tries])
@@ -135,7 +145,11 @@ def _record(state: Search, tried: Tried, commands: list[Command], torso: list[fl
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the largest violations of each gain set, in degrees along the normal, negative inside; of several seeds the worst."""
+    """Return the results of the sweep, for each gain set and part ("attractors", "forced"); of several seeds the worst.
+
+    Violations are degrees along the normal, negative inside.  "passed": whether the default gains keep within "allowed_deg" without forces
+    of a client; None if they were not run.
+    """
     table: dict[str, Any] = {}
     for state in sorted(_searches(found), key=lambda state: state.worst):
         table.setdefault(state.gains, {})[KINDS[state.forced]] = _summary(state)
@@ -163,7 +177,7 @@ def _searches(found: Cells) -> list[Search]:
 
 
 def plot(found: Cells) -> Any:
-    """Draw three panels: largest violation against tries, by clause, and the worst tries over time."""
+    """Return a figure with three panels: largest violation over tries, by clause, and the worst tries over time."""
     states = _searches(found)
     drawing = new_figure(14.0, 4.6)
     course, clauses, over_time = drawing.subplots(1, 3, width_ratios=(1.0, 1.35, 1.0))

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Forced contact: growing forces push a hand into table, body and joint limits, and pull it to and through singular poses.
 
-Claim: with the default gains no force of a client drives a solid deeper than 2 mm into anything or an arm beyond a constraint or a
-limit; and a hand that is pulled to a target, reachable or not, through singular poses or not, does not stop before it arrives and does
-not oscillate by more than 1 mm at rest.  Source: thesis 5.2.2-5.2.4 (f_config and f_work are bounded so that they "not
-dominate the constraint forces") and 5.1 (J^T control of an unreachable target "will cause the robot to oscillate").
-Published: no numbers.  Run time: about six minutes.
+Claim: with the default gains no force of a client drives a solid deeper than 2 mm into anything or an arm beyond a constraint or a limit;
+and a hand that is pulled to a target, reachable or not, through singular poses or not, does not stop before it arrives and does not
+oscillate by more than 1 mm at rest.  Source: thesis 5.2.2-5.2.4 (f_config and f_work are bounded so that they "not dominate the constraint
+forces") and 5.1 (J^T control of an unreachable target "will cause the robot to oscillate").  Published: no numbers.  Run time: about six
+minutes.
 
-The force rises in steps of three seconds each, for both gain sets.  The hand is pulled by the whole body (`mobee.Reacher`).
-Depths are measured at the true joint positions.
+The force rises in steps of three seconds each, for both gain sets.  The hand is pulled by the whole body (`mobee.Reacher`).  Depths are
+measured at the true joint positions.
 """
 
 from __future__ import annotations
@@ -58,7 +58,10 @@ PANELS = (
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """Start angles of the first motors of the left arm [deg], and successive targets relative to the palm at home [m], root frame."""
+    """A start of the left arm and the targets to which its hand is pulled one after the other.
+
+    `start`: angles of the arm's first motors [deg].  `targets`: positions relative to the palm at home [m], root frame.
+    """
 
     start: tuple[float, ...]
     targets: tuple[tuple[float, float, float], ...]
@@ -80,7 +83,7 @@ GOALS = {
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add gains, walls and targets."""
+    """Add the options --gains, --walls and --targets to the parser."""
     walls, targets = list(PUSHES), list(GOALS)
     parser.add_argument("--gains", nargs="+", choices=GAINS, default=list(GAINS), metavar="SET", help=f"of {', '.join(GAINS)}")
     parser.add_argument("--walls", nargs="+", choices=walls, default=walls, metavar="WALL", help=f"of {', '.join(walls)}")
@@ -88,7 +91,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return every wall and every target with each gain set; --quick: the first of them, with few levels of force."""
+    """Return the conditions of the sweep: every wall and every target with each gain set.
+
+    With --quick: the first three of each, with three levels of force.
+    """
     levels, cases = (QUICK_LEVELS, QUICK_CASES) if arguments.quick else (LEVELS, None)
     found = []
     for gains in arguments.gains:
@@ -101,7 +107,11 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Press into a wall: "pressed", a record for each level; or pull the hand to the target: "drawn", and its path."""
+    """Press into the wall, or pull the hand to the target, that the settings name.
+
+    For a wall: {"pressed": the result of `press`}.  For a target: "drawn", "times" (T,) s and "distances" (T,) m, the results of
+    `draw_hand`.
+    """
     if "wall" in settings:
         return {"pressed": press(settings["gains"], settings["wall"], settings["levels"], seed)}
     drawn, times, distances = draw_hand(settings["gains"], settings["target"], seed)
@@ -109,10 +119,13 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def press(gains: str, wall: str, levels: Sequence[float], seed: int) -> list[Record]:
-    """Push from home with one level of force after the other; returns the worst measures during each.
+    """Push the robot from home with one level of force after the other, and return a record for each level.
 
-    `solid_mm`, `beside_mm`: depths of solid pairs that are listed and that are not; `pair`: the deepest.  `clause_deg`, `limit_deg`:
-    negative inside.
+    `gains`: name of the gain set.  `wall`: a key of PUSHES.  `levels`: forces before the squash, in N/kg at a marker or rad/s^2 at a motor.
+
+    Each record has the worst values during the level: "solid_mm" and "beside_mm", depths of solid pairs that are in the simulator's list
+    and that are not; "pair", the deepest of the list; "field_mm", depth of fields; "clause_deg" and "limit_deg", distances beyond
+    constraints and limits, negative inside; "restless_mm", oscillation of the palms.
     """
     plant = OfflinePlant(icub_at_table(), seed, Gains.named(gains), dt=PERIOD[gains])
     robot, step = plant.robot, max(1, round(SAMPLING / plant.dt))
@@ -143,9 +156,10 @@ def _worst(angles: Array) -> float:
 
 
 def draw_hand(gains: str, name: str, seed: int) -> tuple[Record, Array, Array]:
-    """Pull the hand to the targets of a goal; returns measures, times (T,) s and distances from the current target (T,) m.
+    """Pull the left hand to the targets of a goal, one after the other.  `name`: a key of GOALS.
 
-    The measures: oscillation and distance from the target at rest, and `dead_s`, the longest time without motion before the end.
+    Returns the measurements, times (T,) s, and distances from the present target (T,) m.  The measurements are "oscillation_mm" and
+    "from_target_mm", oscillation and distance from the target at rest, and "dead_s", the longest time without motion before the end.
     """
     goal, robot = GOALS[name], icub().robot
     plant = OfflinePlant(icub(), seed, Gains.named(gains), dt=PERIOD[gains])
@@ -176,7 +190,11 @@ def draw_hand(gains: str, name: str, seed: int) -> tuple[Record, Array, Array]:
 
 
 def dead_time(hand: Array, dt: float) -> float:
-    """Return the longest time [s] in which the hand (T, 3) m was SLOW although it was not NEAR its end position."""
+    """Return the longest time [s] during which the hand had stopped before it was at its end position.
+
+    `hand`: positions (T, 3) m.  `dt`: time between two of them [s].  Stopped: slower than 0.2 mm/s over 0.5 s, and more than 1 cm from the
+    end position.
+    """
     window = max(1, round(WINDOW / dt))  # single ticks are meaningless because of the motors' play
     speed = np.linalg.norm(hand[window:] - hand[:-window], axis=1) / (window * dt)
     stopped = (speed < SLOW) & (np.linalg.norm(hand[:-window] - hand[-1], axis=1) > NEAR)
@@ -186,7 +204,10 @@ def dead_time(hand: Array, dt: float) -> float:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the worst measures for every wall, and for every target."""
+    """Return the largest measurements for every wall and every target, by gain set.
+
+    "passed": whether the default gains meet the claim; None if they were not run.
+    """
     pressed, drawn = _grouped(found)
     table: dict[str, Any] = {gains: {} for gains in GAINS}
     for (gains, wall), levels in pressed.items():
@@ -219,7 +240,7 @@ def _largest(records: Sequence[Record], *names: str) -> Record:
 
 
 def plot(found: Cells) -> Any:
-    """Draw depths and margins against the force, and below them the distance of the hand from its targets over time."""
+    """Return a figure of depths and violations over the force, and of the distance of the hand from its targets over time."""
     drawing = new_figure(15.0, 8.0)
     above, below = drawing.subfigures(2, 1, height_ratios=(1.0, 1.1))
     _plot_pressing(above.subplots(1, len(PANELS)), _grouped(found)[0])

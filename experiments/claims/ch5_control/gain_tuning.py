@@ -59,7 +59,15 @@ PALMS = ("left_palm", "right_palm")
 
 @dataclass(frozen=True, slots=True)
 class Judged(Row):
-    """The criteria, measured at the true joint positions."""
+    """The criteria by which a gain set is judged, measured at the true joint positions.
+
+    `settling_s`: median settling time of steps [s].  `overshoot`: the largest of a motor's step, as a share of the step.  `solid_mm`:
+    deepest solid contact while the robot wanders and while the hands press into the table with commands 1 and 3 ticks old; `field_mm`:
+    deepest field contact while pressing; `pushed_mm`: deepest solid contact while a client pushes.  `chatter_mm`, `late_mm`, `later_mm`:
+    chatter of the palms with commands 1, 3 and 4 ticks old.  `clause_deg`, `forced_deg`: largest violation of a constraint without and with
+    a pushing client, negative inside.  `stop_deg_s`: fastest impact at a hard stop.  `longest_ms`: longest control period at which the law
+    is stable.
+    """
 
     settling_s: float  # median of steps of motors and postures
     overshoot: float  # the largest of a motor's step; the deflection by a contact does not count
@@ -92,7 +100,7 @@ MIN_LONGEST = 25.0  # ms; a period of 20 must be possible
 
 
 def objective(judged: Judged) -> float:
-    """Return the settling time [s] plus the prices of unmet requirements; less is better."""
+    """Return the objective of the search: the settling time [s] plus prices of unmet requirements.  Smaller is better."""
     cost = judged.settling_s + 0.2 * max(0.0, MIN_LONGEST - judged.longest_ms)
     for name, (wanted, price) in WANTED.items():
         cost += price * max(0.0, getattr(judged, name) - wanted)
@@ -100,7 +108,7 @@ def objective(judged: Judged) -> float:
 
 
 def evaluate(gains: Gains) -> Judged:
-    """Measure gains by all criteria, always with the same seeds, so that gains can be compared."""
+    """Measure a gain set by all criteria.  The seeds are always the same, so that gain sets can be compared."""
     settling, overshoot = _steps(gains)
     pressed = {age: [press(gains, target, age) for target in _targets()] for age in AGES}
     must_hold = [p for age in AGES[:2] for p in pressed[age]]
@@ -125,7 +133,7 @@ def evaluate(gains: Gains) -> Judged:
 
 @dataclass(frozen=True, slots=True)
 class Pressed:
-    """Depths and chatter of one press [m]."""
+    """Depths of the deepest solid and field contact, and the chatter of the palms, of one press into the table [m]."""
 
     solid: float
     field: float
@@ -133,7 +141,7 @@ class Pressed:
 
 
 def press_targets(count: int) -> list[Array]:
-    """Draw postures, free of contacts without a table, in which a palm is 5 to 25 cm below the top of the table."""
+    """Draw `count` postures (n,) rad in which a palm is 5 to 25 cm below the table's top, and which have no contacts without a table."""
     robot = icub_at_table().robot
     rng, free = np.random.default_rng(PRESS_SEED), icub()
     found: list[Array] = []
@@ -148,7 +156,10 @@ def press_targets(count: int) -> list[Array]:
 
 
 def press(gains: Gains, target: Array, age: int, dt: float = 0.01) -> Pressed:
-    """Send all parts to the target with commands that are `age` ticks old; returns depths and chatter."""
+    """Command all parts to a posture below the table's top, with commands that are `age` ticks old.
+
+    `target`: the posture (n,) rad.  `dt`: tick [s].  Returns depths and chatter.
+    """
     late = MotorParameters(delay=float(MotorParameters().of_motors("delay", 1)[0]) + (age - 1) * dt)
     plant = OfflinePlant(icub_at_table(), PRESS_SEED, gains, late, dt)
     plant.controller.attractor = target
@@ -231,12 +242,12 @@ MIN_STABLE_PERIOD = 0.015  # s: sets that are not stable at this control period 
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
+    """Add the command-line options of this experiment to the parser."""
     parser.add_argument("--sets", type=positive_whole, default=100, metavar="N", help="gain sets to judge (default: 100)")
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Search, continuing after the sets that are in the folder."""
+    """Search for better gains, continuing after the gain sets in `folder`, and return the results."""
     path = folder / RECORDS
     tried = read_tried(path)
     with Records(path, COLUMNS) as records, Progress() as progress:
@@ -248,34 +259,37 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 def read_tried(path: Path) -> list[Tried]:
-    """Read the gain sets that a run has judged so far."""
+    """Read the gain sets that a run has judged so far from its file."""
     return [Tried.of_record(row) for row in read_records(path, COLUMNS)]
 
 
 @dataclass(frozen=True, slots=True)
 class Tried:
-    """A gain set and its criteria."""
+    """A gain set that was judged.  `numbers`: its values by the names in TUNED.  `judged`: its criteria."""
 
     numbers: dict[str, float]
     judged: Judged
 
     @property
     def objective(self) -> float:
-        """The objective; less is better."""
+        """The objective of the search for this gain set, as of the function `objective`; smaller is better."""
         return objective(self.judged)
 
     def record(self) -> dict[str, object]:
-        """Return the record for the file."""
+        """Return the values and criteria as a row of the file."""
         return {**{name: round(value, 6) for name, value in self.numbers.items()}, **self.judged.record()}
 
     @classmethod
     def of_record(cls, row: Mapping[str, str]) -> Tried:
-        """Return the gain set read from a row of the file."""
+        """Return the gain set that a row of the file describes."""
         return cls({name: float(row[name]) for name in TUNED}, Judged.of_record(row))
 
 
 def search(tried: list[Tried], sets: int, seed: int) -> Iterator[Tried]:
-    """Append gain sets to `tried` until there are `sets`, and yield each; the known sets and the seed decide the next."""
+    """Judge gain sets until there are `sets`, append each to `tried`, and yield it.
+
+    The sets in `tried` and the seed determine the next set.  The first one is `Gains.default()`.
+    """
     while len(tried) < sets:
         numbers = _next(tried, seed) if tried else numbers_of(Gains.default())
         tried.append(Tried(numbers, evaluate(gains_with(numbers))))
@@ -283,7 +297,7 @@ def search(tried: list[Tried], sets: int, seed: int) -> Iterator[Tried]:
 
 
 def numbers_of(gains: Gains) -> dict[str, float]:
-    """Return the values of TUNED."""
+    """Return the values of a gain set that the search changes, by the names in TUNED."""
     motors = icub().robot.motors
     springs = gains.of_motors("max_spring", motors)
     numbers = {name: float(getattr(gains, name)) for name in TUNED if name not in SPRINGS}
@@ -291,7 +305,7 @@ def numbers_of(gains: Gains) -> dict[str, float]:
 
 
 def gains_with(numbers: Mapping[str, float]) -> Gains:
-    """Return `Gains.default()` with these values replaced."""
+    """Return `Gains.default()` with the values `numbers`, given by the names in TUNED."""
     common: dict[str, Any] = {name: value for name, value in numbers.items() if name not in SPRINGS}
     gains = replace(Gains.default(), motors=(), groups=(), **common)
     for name, pattern in SPRINGS.items():
@@ -318,7 +332,11 @@ def _changed(numbers: dict[str, float], step: float, rng: np.random.Generator) -
 
 
 def results(tried: list[Tried]) -> dict[str, Any]:
-    """Return the default and the best gain set side by side."""
+    """Return the default and the best gain set side by side.
+
+    "criteria", "gains" and "objective" have two numbers each: of the default and of the best.  "passed": whether no set is clearly better,
+    that is, has less than 0.8 of the default's objective.
+    """
     before, best = tried[0], min(tried, key=lambda one: one.objective)
     criteria = {name: [round(value, 4), round(asdict(best.judged)[name], 4)] for name, value in asdict(before.judged).items()}
     return {
@@ -332,7 +350,7 @@ def results(tried: list[Tried]) -> dict[str, Any]:
 
 
 def figure(folder: Path) -> Path:
-    """Draw the course of the search; raises InvalidValue if nothing was judged."""
+    """Draw the course of the search in `folder` to a file.  Returns its path; raises InvalidValue if no gain set was judged."""
     tried = read_tried(folder / RECORDS)
     if not tried:
         raise InvalidValue(f"{folder} has no gains in it: the run was stopped before the first were judged.")
@@ -340,7 +358,7 @@ def figure(folder: Path) -> Path:
 
 
 def plot(tried: Sequence[Tried]) -> Any:
-    """Draw the objective with its parts, and the gains of the best set so far."""
+    """Return a figure of the objective with its parts, and of the values of the best gain set so far, over the number of sets."""
     drawing = new_figure(12.0, 4.5)
     course, numbers = drawing.subplots(1, 2)
     objectives = [one.objective for one in tried]

@@ -76,7 +76,7 @@ COLUMNS: tuple[tuple[str, float, str, Any], ...] = (  # column of the table, fac
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
+    """Add the command-line options of this experiment to the parser."""
     text = "of each signal in each posture, 2 or more, to measure the noise (default: 2)"
     parser.add_argument("--repetitions", type=whole_from_two, default=2, metavar="N", help=text)
     parser.add_argument("--postures", type=positive_whole, default=3, metavar="N", help="home and N - 1 others (default: 3)")
@@ -84,7 +84,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Check the method, record the responses, fit the motors, and compare the plants."""
+    """Check the method, record the responses, fit the motors, and compare the plants; what is in `folder` already is not repeated.
+
+    Returns the results; "passed" says whether the check of the method was passed.
+    """
     robot = load_robot("icub")
     method = _check(arguments, robot, folder / METHOD)
     with prints_to_stderr():
@@ -122,7 +125,10 @@ def _record(arguments: argparse.Namespace, robot: Robot, folder: Path) -> list[P
 
 
 class BodyPlant:
-    """An `OfflinePlant` with another simulated body: a command formed in a tick moves it in the next."""
+    """A control loop like that of `OfflinePlant`, but with another simulated body, such as PyBullet's.
+
+    As in the live system, a command that is computed in a tick moves the body in the next tick.  `controller`: its controller.
+    """
 
     def __init__(self, model: Model, body: Backend) -> None:
         self.controller = Controller(model, Gains.default())
@@ -130,7 +136,7 @@ class BodyPlant:
         self._command: Array | None = None
 
     def tick(self) -> Array:
-        """Run a tick; returns its encoder readings, (n,) rad."""
+        """Run one tick of the control loop.  Returns the encoder values at its beginning, (n,) rad."""
         self._k += 1
         q = self._body.motors.encoders(self._k, DT)
         if self._command is not None:
@@ -141,7 +147,12 @@ class BodyPlant:
 
 
 def reproduce(robot: Robot, fit: Fit, actions: int, seed: int) -> dict[str, Any]:
-    """Return the differences [deg] between PyBullet and the offline plant with identified, published and ideal motors."""
+    """Run the same actions of an arm with PyBullet and with the offline plant, and compare the motions with PyBullet's.
+
+    Returns the differences of the motors' positions [deg] ("rms_deg", "largest_deg", and at the ends of actions "end_deg" and
+    "largest_end_deg") for the offline plant with "identified", "published" and "ideal" motors, and for "pybullet_with_other_noise".  `fit`:
+    the fitted motors.  `actions`: their number.
+    """
     model = Model(robot, World())
     targets = free_targets(model, actions, np.random.default_rng([seed, 3]))
 
@@ -169,13 +180,13 @@ def reproduce(robot: Robot, fit: Fit, actions: int, seed: int) -> dict[str, Any]
 
 
 def identified_motors(fit: Fit) -> MotorParameters:
-    """Return the fitted values as motor parameters of a plant."""
+    """Return the fitted values as parameters of an offline plant's motors."""
     p = fit.parameters
     return MotorParameters(lag=p.lag, delay=p.delay, backlash=p.backlash, friction=p.friction, encoder_noise=encoder_noise(fit))
 
 
 def free_targets(model: Model, count: int, rng: np.random.Generator) -> Array:
-    """Draw targets of the arm, (count, n_part) rad, at which no fields of the robot are in contact."""
+    """Draw `count` random postures of the left arm, (count, n_part) rad, in which no shapes of the robot are in contact."""
     robot, part = model.robot, model.robot.part(PART)
     low, high = robot.limits[part.slice][WRIST].T
     targets: list[Array] = []
@@ -210,7 +221,7 @@ def _difference(course: Array) -> dict[str, float]:
 
 
 def csv_table(robot: Robot, fit: Fit) -> str:
-    """Return the table with a line for each motor, in s and degrees."""
+    """Return the fit as a CSV table with a line for each motor, in s and degrees."""
     columns = [f"{name}_{UNIT[name][0].replace('/', '_')}" for name in FITTED]
     head = [column + suffix for column in columns for suffix in ("", "_deviation")]
     lines = [",".join(["motor", *head, "noise_deg", "chi_square", "misfit_deg", "held_out_chi_square", "held_out_misfit_deg"])]
@@ -225,7 +236,7 @@ def csv_table(robot: Robot, fit: Fit) -> str:
 
 
 def toml_data(robot: Robot, fit: Fit, seed: int) -> str:
-    """Return the text of the file for mobee/simulation/identified/."""
+    """Return the fit as the text of a file for mobee/simulation/identified/, in SI units.  `seed`: noted in the file."""
     made = {"date": time.strftime("%Y-%m-%d"), "seed": seed, **{name: metadata.version(name) for name in MADE_WITH}}
     lines = [HEADER.format(robot=robot.name, period=NOISE_PERIOD), f"encoder_noise = {encoder_noise(fit):.6f}\n", "[made]"]
     lines += [f"{key} = {value}" if isinstance(value, int) else f'{key} = "{value}"' for key, value in made.items()]
@@ -238,7 +249,11 @@ def toml_data(robot: Robot, fit: Fit, seed: int) -> str:
 
 
 def summary(robot: Robot, fit: Fit) -> dict[str, Any]:
-    """Return median, range and uncertainty of each parameter over the motors, and its distance from the published setting."""
+    """Return statistics of the fit over all motors.
+
+    "parameters": for each one the median, range and standard deviation, the published setting, and the largest distance from it in standard
+    deviations.  "encoder_noise" and "residual": of the encoders and of the fit.
+    """
     published, found = MotorParameters(), {}
     for name in FITTED:
         unit, factor = UNIT[name]
@@ -266,12 +281,15 @@ def summary(robot: Robot, fit: Fit) -> dict[str, Any]:
 
 
 def encoder_noise(fit: Fit) -> float:
-    """Return the rms noise of all encoders, rad."""
+    """Return the root mean square of the noise of all encoders [rad], at a tick of NOISE_PERIOD."""
     return float(np.sqrt(np.square(fit.noise).mean()))
 
 
 def figure(folder: Path) -> Path:
-    """Draw measured and fitted responses, and the values with their uncertainty; raises InvalidValue for a run without a fit."""
+    """Draw measured and fitted responses, and the fitted values with their uncertainty, to a file in `folder`; returns its path.
+
+    Raises InvalidValue for a run without a fit.
+    """
     table, robot = folder / TABLE, load_robot("icub")
     if not table.exists():
         raise InvalidValue(f"{folder} has no fit yet: continue with `mobee experiment run motor-identification --resume {folder}`.")

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Fits the motor model (mobee.simulation.motors) to responses, and checks the method with simulated motors.
 
-Lag, delay, backlash, friction and encoder noise of every motor are fitted.  The model is simulated for all motors at once, since they do
-not influence each other.  The model does not depend on the start of a signal, so each response is compared without its mean.
+Lag, delay, backlash, friction and encoder noise of every motor are fitted.  The model is simulated for all motors at once, because the
+motors do not influence each other.  In the model, the response does not depend on the position in which a signal starts, so the mean of
+each response is subtracted before the comparison.
 """
 
 from __future__ import annotations
@@ -36,7 +37,13 @@ UNIT = {"lag": ("s", 1.0), "delay": ("s", 1.0), "backlash": ("deg", 180.0 / np.p
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fit:
-    """Fitted values of the motors, (n,), their standard deviations, and the quality of the fit."""
+    """Fitted values of n motors, and the quality of the fit.
+
+    `parameters`: the values.  `deviation`: their standard deviations (n,), by name, in s, rad and rad/s.  `noise`: of the encoders at a
+    tick of NOISE_PERIOD, (n,) rad.  `chi_square`: of the fitted responses per degree of freedom, (n,); 1 if only encoder noise remains.
+    `misfit`: rms residual of the mean response beyond the noise, (n,) rad.  `held_out_chi_square` and `held_out_misfit`: the same for
+    signals that were not fitted.
+    """
 
     parameters: MotorParameters
     deviation: dict[str, Array]  # lag, delay s; backlash rad; friction rad/s
@@ -48,7 +55,11 @@ class Fit:
 
 
 def fit(robot: Robot, responses: Sequence[Responses], signals: tuple[Array, Array]) -> Fit:
-    """Fit the motors of a robot; `responses`: of each motor, in the robot's order, to the same two signals."""
+    """Fit the motor model to the responses of all motors of a robot.
+
+    `responses`: of each motor, in the robot's order.  `signals`: the fitted and the held-out signal (ticks,) rad/s, the same for all
+    motors.
+    """
     noise = np.array([_noise(each.fitted, each.held_out) for each in responses])  # at a tick of DT
     sigma = noise / np.sqrt(responses[0].fitted[..., 0].size)  # of the mean response
     measured, held_out = (_centred(np.array([q.mean(axis=(0, 1)) for q in kind])) for kind in zip(*map(_both, responses), strict=True))
@@ -72,7 +83,7 @@ def fit(robot: Robot, responses: Sequence[Responses], signals: tuple[Array, Arra
 
 
 def respond(robot: Robot, parameters: MotorParameters, signal: Array) -> Array:
-    """Return the model's encoder positions without noise, (n, ticks) rad, for a signal (ticks,) rad/s to every motor."""
+    """Return the positions of the motor model without encoder noise, (n, ticks) rad.  `signal`: velocity (ticks,) rad/s for every motor."""
     motors = Motors(robot, parameters, 0, robot.limits.mean(axis=1))
     substeps = parameters.substeps(DT)
     q = np.empty((len(signal), len(robot.motors)))
@@ -182,7 +193,7 @@ def _delay_deviation(squares: Array, best: Array) -> Array:
 
 
 def known_motors(count: int, seed: int) -> MotorParameters:
-    """Draw parameters over their whole range, every third motor without friction, every fifth without play."""
+    """Draw random parameters of `count` motors.  Every third motor has no friction, and every fifth has no play."""
     rng = np.random.default_rng([seed, 1])
     lag, delay = rng.uniform(0.01, 0.1, count), 0.005 * rng.integers(0, 9, count)
     backlash, friction = np.deg2rad(rng.uniform(0.0, 0.8, count)), np.deg2rad(rng.uniform(0.0, 2.0, count))
@@ -194,7 +205,10 @@ def known_motors(count: int, seed: int) -> MotorParameters:
 def synthetic(
     robot: Robot, parameters: MotorParameters, signals: tuple[Array, Array], shape: tuple[int, int], seed: int
 ) -> list[Responses]:
-    """Return simulated responses of motors with these parameters and encoder noise; `shape`: postures, repetitions."""
+    """Return simulated responses, with encoder noise, of motors with these parameters, for each motor of the robot.
+
+    `signals`: two signals (ticks,) rad/s.  `shape`: numbers of postures and of repetitions.
+    """
     rng = np.random.default_rng([seed, 2])
     sigma = NOISE * np.sqrt(NOISE_PERIOD / DT)
     clean = [respond(robot, parameters, signal) for signal in signals]
@@ -205,7 +219,11 @@ def synthetic(
 
 
 def check_method(robot: Robot, postures: int, repetitions: int, seed: int) -> dict[str, Any]:
-    """Fit simulated motors with known values; returns the largest errors, absolute and in standard deviations."""
+    """Fit simulated motors with known values, and compare the fit with these values.
+
+    Returns the largest error of each parameter, absolute and in standard deviations, and "passed", whether all errors are less than 5
+    standard deviations.
+    """
     signals = fitted_signal(), held_out_signal(np.random.default_rng(seed))
     known = known_motors(len(robot.motors), seed)
     found = fit(robot, synthetic(robot, known, signals, (postures, repetitions), seed), signals)

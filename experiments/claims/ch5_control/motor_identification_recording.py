@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Records the responses of the PyBullet robot's motors: velocities [rad/s] in, encoder positions out, every tick."""
+"""Records the responses of the PyBullet robot's motors: commanded velocities [rad/s] and the resulting encoder values of every tick."""
 
 from __future__ import annotations
 
@@ -35,7 +35,10 @@ ALL = slice(None)
 
 
 def fitted_signal() -> Array:
-    """Return steps of four sizes and both signs, reversals without rest, slow ramps through zero; (ticks,) rad/s."""
+    """Return the signal to which the model is fitted, (ticks,) rad/s.
+
+    It has steps of four sizes and both signs, reversals without rest, and slow ramps through zero.
+    """
     parts = [_preload()]
     for speed in SPEEDS:
         parts += [_hold(speed, 0.3), _hold(0.0, 0.3), _hold(-speed, 0.3), _hold(0.0, 0.3)]
@@ -48,7 +51,7 @@ def fitted_signal() -> Array:
 
 
 def held_out_signal(rng: np.random.Generator) -> Array:
-    """Return random steps of random length, 4 s, (ticks,) rad/s; not used in the fit."""
+    """Return a signal of random steps of random length, at least 4 s, (ticks,) rad/s.  It checks the fit and is not used in it."""
     parts, position = [_preload()], 0.0
     while sum(map(len, parts)) * DT < 4.0:
         speed, duration = np.deg2rad(rng.uniform(-40.0, 40.0)), rng.uniform(0.05, 0.4)
@@ -70,7 +73,7 @@ def _hold(speed: float, duration: float) -> Array:
 
 
 def make_body(robot: Robot, seed: int) -> Backend:
-    """Return the simulated robot in an empty world; raises BackendUnavailable without PyBullet."""
+    """Return the PyBullet robot in an empty world; raises BackendUnavailable without PyBullet."""
     try:
         from services.robot_sim.bullet import BulletBackend  # needs PyBullet, which is not available for every Python
     except ModuleNotFoundError as error:
@@ -80,7 +83,7 @@ def make_body(robot: Robot, seed: int) -> Backend:
 
 @contextmanager
 def prints_to_stderr() -> Iterator[None]:
-    """Redirect standard output to standard error: PyBullet prints a line for every scene, from C."""
+    """Redirect standard output to standard error in this context manager, because PyBullet prints a line for every scene from C."""
     sys.stdout.flush()
     kept = os.dup(1)
     os.dup2(2, 1)
@@ -93,16 +96,19 @@ def prints_to_stderr() -> Iterator[None]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Responses:
-    """Encoder readings [rad] of one motor at the beginning of every tick, (postures, repetitions, ticks)."""
+    """Encoder values [rad] of one motor at the beginning of every tick.
+
+    `fitted` and `held_out`: for the two signals, each (postures, repetitions, ticks).
+    """
 
     fitted: Array
     held_out: Array
 
 
 def postures(model: Model, motor: int, count: int, rng: np.random.Generator) -> Array:
-    """Return home and random postures around it, (count, n) rad, in which the motor has ROOM and the robot touches nothing.
+    """Return home and random postures around it, (count, n) rad, in which the motor has room for the signals.
 
-    Raises InvalidValue if too few are found.
+    It can move by 14 degrees (ROOM) to either side without a limit or a contact.  Raises InvalidValue if too few postures are found.
     """
     robot = model.robot
     low, high = robot.limits.T
@@ -121,7 +127,11 @@ def postures(model: Model, motor: int, count: int, rng: np.random.Generator) -> 
 
 
 def record(body: Backend, robot: Robot, motor: int, at: Array, signals: tuple[Array, Array], repetitions: int) -> Responses:
-    """Record responses to both signals in each of the postures `at` (postures, n) rad, several times."""
+    """Command both signals to one motor of `body`, and return its responses.
+
+    `motor`: its index.  `at`: postures (postures, n) rad in which each signal starts.  `signals`: (ticks,) rad/s.  `repetitions`: in each
+    posture.  Raises InvalidValue if the robot cannot reach a posture.
+    """
     shape = (len(at), repetitions)
     fitted, held_out = np.empty((*shape, len(signals[0]))), np.empty((*shape, len(signals[1])))
     k = 0  # ticks since the body was made: the noise of the encoders depends on it
@@ -136,7 +146,7 @@ def record(body: Backend, robot: Robot, motor: int, at: Array, signals: tuple[Ar
 
 
 def save(path: Path, responses: Responses, at: Array, signals: tuple[Array, Array]) -> None:
-    """Write responses, postures and signals in SI units, whole or not at all."""
+    """Write responses, postures and signals to a file, in SI units.  An interruption leaves no incomplete file."""
     unfinished = path.with_suffix(".part.npz")
     np.savez_compressed(
         unfinished, fitted=responses.fitted.astype(np.float32), held_out=responses.held_out.astype(np.float32), postures=at,
@@ -146,7 +156,7 @@ def save(path: Path, responses: Responses, at: Array, signals: tuple[Array, Arra
 
 
 def load(path: Path) -> tuple[Responses, tuple[Array, Array]]:
-    """Read the responses and the signals."""
+    """Read the responses and the two signals (ticks,) rad/s from a file that `save` wrote."""
     with np.load(path) as file:
         responses = Responses(file["fitted"].astype(float), file["held_out"].astype(float))
         return responses, (file["fitted_signal"], file["held_out_signal"])

@@ -51,7 +51,15 @@ PANELS = (("moved_mm", "the hand moved [mm]"), ("solid_mm", "deepest solid [mm]"
 
 
 class ExternalPush:
-    """Moves the joints of a plant: inertia dv/dt = J^T f - friction v, as motors yield in the torque modality."""
+    """An external force at the left hand that moves the joints of a plant, called before every tick.
+
+    The joints move by inertia dv/dt = J^T f - friction v, as motors yield in the torque modality.
+
+    Args:
+        plant: the plant.
+        force: (3,) N, root frame.
+        start, end: times between which the force acts [s].
+    """
 
     def __init__(self, plant: OfflinePlant, force: Array, start: float, end: float) -> None:
         self._plant, self._force = plant, force
@@ -59,7 +67,7 @@ class ExternalPush:
         self._velocity = np.zeros(len(plant.robot.motors))
 
     def __call__(self, tick: int) -> None:
-        """Move the joints before a tick."""
+        """Move the joints by the external force, before the tick of this number."""
         plant = self._plant
         torque = plant.model.jacobian(plant.motors.q, MARKER)[:3].T @ self._force if tick in self._ticks else 0.0
         # The exact solution over one tick: at 20 ms the friction is stiff.
@@ -70,27 +78,30 @@ class ExternalPush:
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add laws and directions."""
+    """Add the options --laws and --directions to the parser."""
     choices = tuple(DIRECTIONS)
     parser.add_argument("--laws", nargs="+", choices=LAWS, default=list(LAWS), metavar="LAW", help=f"of {', '.join(LAWS)}")
     parser.add_argument("--directions", nargs="+", choices=choices, default=list(choices), metavar="WHERE", help=f"of {', '.join(choices)}")
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return every law, direction and force."""
+    """Return the conditions of the sweep: every law, direction and force."""
     return grid(law=arguments.laws, direction=arguments.directions, force=QUICK_FORCES if arguments.quick else FORCES)
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Push the robot once, and return the measurements."""
+    """Push the robot once, and return the result of `push_hand`."""
     return push_hand(settings["law"], settings["direction"], settings["force"], seed)
 
 
 def push_hand(law: str, direction: str, force: float, seed: int) -> dict[str, Any]:
-    """Hold home while the hand is pushed, and return the worst measures; law "off": the commanded velocity is always 0.
+    """Command home while an external force pushes the left hand, and return the worst measurements.
 
-    `moved_mm`, `away_mm`: distance of the hand from its start, the largest and at the end.  `solid_mm`, `beside_mm`: depths of solid pairs
-    that are listed and that are not; `pair`: the deepest.  `clause_deg`: negative inside.  `stop_deg_s`: fastest impact at a hard stop.
+    `law`: name of the gain set, or "off": the commanded velocity is always 0.  `direction`: a key of DIRECTIONS.  `force`: N.
+
+    Keys: "moved_mm" and "away_mm", largest and last distance of the hand from its start; "solid_mm" and "beside_mm", depths of solid pairs
+    that are in the simulator's list and that are not; "pair", the deepest of the list; "field_mm", depth of fields; "clause_deg", violation
+    of a constraint, negative inside; "stop_deg_s", fastest impact at a hard stop.
     """
     gains = Gains.named("default" if law == "off" else law)
     if law == "off":
@@ -120,7 +131,10 @@ def push_hand(law: str, direction: str, force: float, seed: int) -> dict[str, An
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return for each law and direction the least force at which each event occurred; None if it did not occur."""
+    """Return the results by law and direction: the smallest force [N] at which each event occurred, None if it did not occur.
+
+    "passed": whether with the default gains forces of at most 5 N cause no contact and no violation, and the hand returns; None if not run.
+    """
     pushes = _pushes(found)
     table = {law: {direction: _summary(mine) for (of, direction), mine in pushes.items() if of == law} for law in LAWS}
     judged = [one for (law, _), mine in pushes.items() for one in mine if law == "default" and one["force"] <= GENTLE]
@@ -152,7 +166,7 @@ def _pushes(found: Cells) -> dict[tuple[str, str], list[dict[str, Any]]]:
 
 
 def plot(found: Cells) -> Any:
-    """Draw distances and depths against the force, a column for each direction."""
+    """Return a figure of distances and depths over the force, a column for each direction."""
     pushes = _pushes(found)
     directions = [name for name in DIRECTIONS if any(direction == name for _, direction in pushes)]
     drawing = new_figure(3.0 * len(directions), 7.0)

@@ -4,7 +4,7 @@
 Claim: at all control periods of 1 to 20 ms, single motors and whole postures reach their targets and stay there, with the default gains
 within three and six seconds (steps of 20 degrees alone, of up to half a range together), with at most 5 % overshoot.  Source: thesis 5.2
 (the dynamical system of eq. 5.7); its figures show no step response.  Published number: an action of an arm took some 9.6 s, 18 000 in two
-days, three agents at once (thesis 7.3). Run time: a few minutes.
+days, three agents at once (thesis 7.3).  Run time: a few minutes.
 
 Settling time: until the joint stays within 5 % of the step around its end position.  Error: distance of the end position from the
 attractor, which is not zero where a limit or a constraint pushes.  The true joint positions are measured, not the encoders; the motors have
@@ -45,7 +45,7 @@ ASIDE = {False: 0.96, True: 1.04}  # factors that separate the marks of motors a
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add gains, periods, postures and motors."""
+    """Add the options --gains, --periods, --postures and --motors to the parser."""
     parser.add_argument("--gains", nargs="+", choices=GAINS, default=list(GAINS), metavar="SET", help=f"of {', '.join(GAINS)}")
     parser.add_argument("--periods", nargs="+", type=positive_number, default=list(PERIODS), metavar="MS", help="control periods in ms")
     parser.add_argument("--postures", type=positive_whole, default=10, metavar="N", help="steps of torso and arms together (default: 10)")
@@ -53,9 +53,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return every gain set, period and step; motors that the gain set never moves are left out.
+    """Return the conditions of the sweep: every gain set, control period and step.
 
-    Raises UnknownName, and InvalidValue for a period at which the law is not stable.
+    A step is one of a single motor or of a whole posture; motors that the gain set never moves have none.  Raises UnknownName for an
+    unknown motor, and InvalidValue for a period at which the law is not stable.
     """
     known, periods, chosen, count = icub().robot.motors, arguments.periods, arguments.motors, arguments.postures
     if arguments.quick:
@@ -77,7 +78,11 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Run and measure one step."""
+    """Run one step and measure it.  Returns the settings and the measurements as one dict.
+
+    Main keys: "settling", time [s]; "overshoot", as a share of the step; "is_settled"; "error_deg", distance of the end position from the
+    attractor.
+    """
     step, gains = settings["step"], Gains.named(settings["gains"])
     if step.startswith(POSTURE):
         number = int(step.removeprefix(POSTURE))
@@ -102,7 +107,10 @@ def _posture(number: int, seed: int) -> Array:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return median and worst of each gain set and period."""
+    """Return the median and the worst value of each measurement, by gain set, control period, and motors or postures.
+
+    "passed": whether all steps with the default gains meet the claim; None if they were not run.
+    """
     responses = _responses(found)
     table: dict[str, Any] = {}
     for (gains, period, is_posture), mine in responses.items():
@@ -136,7 +144,7 @@ def _responses(found: Cells) -> Responses:
 
 
 def plot(found: Cells) -> Any:
-    """Draw settling time and overshoot against the control period, and the responses of some motors."""
+    """Return a figure of settling time and overshoot over the control period, and of the responses of some motors."""
     responses = _responses(found)
     drawing = new_figure(13.0, 4.2)
     time, overshoot, steps = drawing.subplots(1, 3)

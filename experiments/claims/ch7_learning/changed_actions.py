@@ -6,10 +6,10 @@ is as accurate as one that forgets nothing in a world that does not change.
 Source: aim of this reproduction, to thesis 7.2.6.  Published number: none.
 Run time: half a minute on 2 cores.
 
-A tabular world of the rank 3 lattice with equidistant neighbours, in which every action succeeds.  After 2000 transitions a random
-state and two of its neighbours are blocked: all actions to them end where they began.  1000 more transitions follow.  The error of the
-model is the mean L1 distance between debiased beliefs and truth, of the actions into blocked states, or of all others.  In the other
-half of the runs nothing changes.
+A tabular world of the rank 3 lattice (81 states) with equidistant neighbours, in which every action succeeds.  After 2000 transitions a
+random state and two of its neighbours are blocked: all actions towards these states end in the state in which they began.  1000 more
+transitions follow.  The error of the model is the mean L1 distance between its probabilities, without imagined outcomes, and the true ones;
+it is computed for the actions into blocked states, and for all other actions.  In the other half of the runs nothing changes.
 """
 
 from __future__ import annotations
@@ -48,7 +48,11 @@ MARGIN = 0.01  # of the error in a world that does not change
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return every agent with and without a change; the short version makes a quarter of the transitions."""
+    """Return the settings of the runs: each of four agents, in a world that changes and in one that does not.
+
+    The agents forget nothing, forget with the factors .95 and .8, or detect changes by run lengths.  With --quick the runs have a quarter
+    of the transitions.
+    """
     share, name = (4, "quick-") if arguments.quick else (1, "")
     return [
         Condition(
@@ -60,10 +64,11 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Explore before and after the change.
+    """Let one agent explore before and after the change, and measure the error of its model.
 
-    Returns `errors` (checks + 1, 2), before the first transition after the change and at every check, of changed actions (0 without a
-    change) and of the others; and `tries`, how often a changed action was tried since, over the mean of all actions.
+    Returns `errors` (checks + 1, 2), the mean L1 errors before the first transition after the change and then after every 20 transitions:
+    column 0 of the changed actions (0 in a world that does not change), column 1 of all others.  `tries` is the mean number of tries of a
+    changed action since the change, divided by that of all actions that can be tried (1 in a world that does not change).
     """
     space, rng = arm_space(), np.random.default_rng([seed, 726])
     middle = int(rng.integers(len(space)))
@@ -96,12 +101,18 @@ Runs = Mapping[tuple[str, bool], list[dict[str, Any]]]  # by agent, and whether 
 
 
 def left(run: dict[str, Any], after: int = JUDGED_AFTER) -> float:
-    """Return the error of changed actions `after` transitions after the change, divided by their error at the change."""
+    """Return the error of the changed actions `after` transitions after the change, divided by their error at the change.
+
+    `run`: result of `trial` with a change.  `after`: a multiple of 20.
+    """
     return float(run["errors"][after // CHECK_PERIOD, 0] / run["errors"][0, 0])
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return a row for each agent, and the claims if all were run in full."""
+    """Return the results: "agents" has a row of numbers for each agent, "claims" the judged claims.
+
+    If not every agent was run in full, there are no rows, and the claims have no numbers.
+    """
     runs = grouped_by(found, "agent", "changed")
     whole = len(runs) == 2 * len(AGENTS) and len(runs[OURS, True][0]["errors"]) == AFTER // CHECK_PERIOD + 1
     rows = {agent: _row(runs[agent, True], runs[agent, False]) for agent in AGENTS} if whole else {}
@@ -155,7 +166,10 @@ CLAIMS = (
 
 
 def plot(found: Cells) -> Any:
-    """Draw the errors of changed actions over the transitions since the change."""
+    """Draw the L1 error of the changed actions over the transitions since the change, a curve for each agent.
+
+    Returns a matplotlib figure.
+    """
     runs, drawing = grouped_by(found, "agent", "changed"), new_figure(7.0, 4.5)
     axes = drawing.subplots()
     for number, agent in enumerate(AGENTS):

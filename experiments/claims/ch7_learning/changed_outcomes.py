@@ -6,12 +6,13 @@ so corrects its model.  Ours: an agent that forgets old counts should correct it
 Source: thesis 7.2.6 (where instabilities of the simulator were the cause, and few runs were examined).  Published number: none.
 Run time: 3 minutes on 2 cores.
 
-The left arm on the lattice of rank 3. After 3000 transitions a ball of 6 cm enters where the hand is in the middle state; or the friction
-of the elbow doubles from 4 deg/s, with which it arrives, to 8, with which it sticks. 3000 more transitions follow, from home. With
-friction no action settles, because the controller continues to drive the motor: actions end after 8 s. Walks through both worlds measure
-which actions changed. The error of the model is the mean L1 error of its debiased counts over the actions that changed, relative to the
-error at the change, before the first transition after it. Forgetting limits an action's counts to 1 / (1 - forgetting), and so keeps its
-reward above a bound: with 0.8 the action with most outcomes keeps the highest reward, and a curious agent tries few others.
+The left arm on the lattice of rank 3.  After 3000 transitions a ball with a radius of 6 cm appears where the hand is in the middle state;
+or the friction of the elbow doubles from 4 deg/s, with which the joint arrives, to 8, with which it sticks.  3000 more transitions follow,
+from home.  With friction no action settles, because the controller continues to drive the motor: actions end after 8 s.  Walks through both
+worlds measure which actions changed.  The error of the model is the mean L1 error of its debiased counts over the actions that changed,
+relative to the error at the change, before the first transition after it.  Forgetting limits an action's counts to 1 / (1 - forgetting),
+and so keeps its reward above a bound: with 0.8 the action with most outcomes keeps the highest reward, and a curious agent tries few
+others.
 """
 
 from __future__ import annotations
@@ -57,7 +58,11 @@ DIFFERENT, SAME = 1.0, 0.2  # L1 distance between an action's outcomes before an
 
 
 def plant_of(change: str, is_after: bool, seed: int) -> OfflinePlant:
-    """Return the left arm at home, before or after an "object" has entered its space, or the elbow's "friction" has doubled."""
+    """Return an offline plant of the left arm at home, before or after a change of its world.
+
+    `change` "object": after the change, a ball of 6 cm radius is in the space of the arm.  "friction": the elbow has friction, after the
+    change twice as much, and actions time out after 8 s.
+    """
     if change == "object":
         return arm_plant(seed, world=_ball() if is_after else None)
     published = Gains.published_2014()
@@ -78,7 +83,10 @@ def _ball() -> World:
 
 @cache
 def truths(change: str) -> tuple[Truth, Truth]:
-    """Measure outcomes before and after the change by a walk through each world; the walks are the same in every process."""
+    """Measure the outcomes of all actions by a walk before and by a walk after a change; returns the frequencies before and after.
+
+    `change`: "object" or "friction", as in `plant_of`.  The walks have a fixed seed, so they are the same in every process.
+    """
     before, after = (
         truth_of(arm_space(), walk(arm_space(), partial(plant_of, change, is_after), TRIES, MAX_WALK, WALK)) for is_after in (False, True)
     )
@@ -86,13 +94,21 @@ def truths(change: str) -> tuple[Truth, Truth]:
 
 
 def compare(before: Truth, after: Truth) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Return which actions (S, A) have other outcomes since the change, and which the same; neither where that is not known."""
+    """Compare the outcomes of each action before and after the change; returns two masks (S, A): the changed and the unchanged actions.
+
+    An action is changed if the L1 distance of its outcomes is at least DIFFERENT (1.0), and unchanged if it is at most SAME (0.2).  An
+    action with a distance between these bounds, or with an unknown outcome, is in neither mask.
+    """
     difference: Array = np.where(before.tries > 0, l1(before, after), np.nan)
     return np.nan_to_num(difference) >= DIFFERENT, np.nan_to_num(difference, nan=2.0) <= SAME
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return every change with every agent; the short version makes a third of the transitions."""
+    """Return the settings of the runs: both changes ("object", "friction") with each of five agents.
+
+    An agent has an explorer ("curious" or "least_tried") and a factor by which it forgets old counts.  With --quick the runs have 30 % of
+    the transitions.
+    """
     share, name = (QUICK, "quick-") if arguments.quick else (1.0, "")
     return [
         Condition(
@@ -104,10 +120,11 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Explore before and after the change.
+    """Let one agent explore before and after the change, and measure its model after every 50 transitions.
 
-    Returns among others `seen`, the transitions (T, 3); `series` (checks, 4), at every check of the model the mean error of changed and of
-    unchanged actions, then their mean values; and `at_change`, the error of changed actions before the first transition after the change.
+    Returns `seen` (T, 3), the transitions: state, action, state reached.  `series` (checks, 4): the mean L1 error of the changed and of the
+    unchanged actions, then the mean value [nats] of both.  `at_change`: the error of the changed actions before the first transition after
+    the change.  `changed`, `same`: the masks (S, A) of `compare`.  Raises InvalidValue if no action is changed.
     """
     change, known = settings["change"], truths(settings["change"])
     changed, same = compare(*known)
@@ -136,7 +153,10 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def summary(values: dict[str, Any]) -> dict[str, Any]:
-    """Reduce the transitions of a trial to `tried`, the number of those with a changed action before each check, (checks,)."""
+    """Reduce the values of `trial` for the raw record: `tried` replaces the transitions `seen`.
+
+    `tried` (checks,) is the number of transitions with a changed action among the 50 transitions before each check.
+    """
     kept = {name: value for name, value in values.items() if name != "seen"}
     states, actions, _ = values["seen"].T
     tried = values["changed"].astype(bool)[states, actions].reshape(len(values["series"]), CHECK_PERIOD).sum(axis=1)
@@ -145,7 +165,12 @@ def summary(values: dict[str, Any]) -> dict[str, Any]:
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """One run; see `trial` and `summary`."""
+    """The results of one run: its model was checked after every 50 transitions, and the world changed in the middle.
+
+    `tried` (checks,): transitions with a changed action since the check before.  `series` (checks, 4): mean L1 error of changed and of
+    unchanged actions, then mean value [nats] of both.  `at_change`: error of the changed actions before the first transition after the
+    change.  `changed`, `same`: masks (S, A) of the changed and the unchanged actions.
+    """
 
     tried: Ints
     series: Array  # (checks, 4): errors, then values, each of changed and of unchanged actions
@@ -155,33 +180,39 @@ class Run:
 
     @property
     def checks_before(self) -> int:
-        """The number of checks before the change, as many as after."""
+        """The number of checks before the change: half of all checks."""
         return len(self.series) // 2
 
     @property
     def tries(self) -> Array:
-        """Tries of changed actions between two checks, over the mean of all actions, (checks,)."""
+        """At each check, the mean tries of a changed action since the check before, divided by the mean tries of all actions, (checks,)."""
         relative: Array = self.tried / CHECK_PERIOD * arm_space().state_actions / self.changed.sum()
         return relative
 
     @property
     def tries_after(self) -> float:
-        """The mean of `tries` soon after the change."""
+        """The mean of `tries` in the first 500 transitions after the change."""
         return float(self.tries[self.checks_before : self.checks_before + WINDOW // CHECK_PERIOD].mean())
 
     @property
     def tries_before(self) -> float:
-        """The mean of `tries` in a time of the same length before the change."""
+        """The mean of `tries` in the last 500 transitions before the change."""
         return float(self.tries[self.checks_before - WINDOW // CHECK_PERIOD : self.checks_before].mean())
 
     @property
     def value_jump(self) -> float:
-        """The highest value of changed actions soon after the change, over their value just before."""
+        """The largest value of the changed actions in the first 500 transitions after the change, over their last value before it.
+
+        A value at a check is the mean value of all changed actions.
+        """
         return self._jump(self.checks_before)
 
     @property
     def value_jump_before(self) -> float:
-        """The highest value of these actions in a window of equal length before the change, over their value just before that window."""
+        """The number for `value_jump` without a change: it is computed from the last 500 transitions before the change.
+
+        It is the largest value of the changed actions in these transitions, divided by their value just before these transitions.
+        """
         return self._jump(self.checks_before - WINDOW // CHECK_PERIOD)
 
     def _jump(self, check: int) -> float:
@@ -190,24 +221,24 @@ class Run:
 
     @property
     def errors(self) -> Array:
-        """The error of changed actions after the change, over that at the change, (checks,)."""
+        """The L1 error of the changed actions at each check after the change, divided by the error at the change, (checks_after,)."""
         relative: Array = self.series[self.checks_before :, 0] / self.at_change
         return relative
 
     @property
     def error_left(self) -> float:
-        """The last of `errors`."""
+        """The L1 error of the changed actions at the end of the run, divided by the error at the change."""
         return float(self.errors[-1])
 
     @property
     def relearned(self) -> float:
-        """Transitions after the change until the error is halved; infinite if it never is."""
+        """The number of transitions after the change until the error of the changed actions is halved; inf if it never is."""
         small = np.flatnonzero(self.errors <= RELEARNED)
         return float(CHECK_PERIOD * (small[0] + 1)) if len(small) else float("inf")
 
     @property
     def relearned_within(self) -> float:
-        """The smaller of `relearned` and the number of transitions after the change."""
+        """The number of transitions until the error is halved, at most all transitions after the change."""
         return float(min(self.relearned, CHECK_PERIOD * (len(self.series) - self.checks_before)))
 
 
@@ -216,7 +247,7 @@ Number = Callable[[Run], float]
 
 
 def runs_of(found: Cells) -> Runs:
-    """Return the finished runs of each condition."""
+    """Group the finished runs by (change, explorer, forgetting); each group is sorted by seed."""
 
     def of(result: CellResult) -> Run:
         values = result.values
@@ -237,7 +268,10 @@ COLUMNS: dict[str, Number] = {
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return a row for each condition; and the claims with numbers if all were run in full."""
+    """Return the results: "agents" has a row for each change and agent, "claims" the judged claims.
+
+    If not every agent was run in full with both changes, the claims have no numbers.
+    """
     runs = runs_of(found)
     keys = [(change, *agent) for change, agent in product(CHANGES, AGENTS)]
     whole = all(runs.get(key) for key in keys) and len(runs[keys[0]][0].series) == 2 * TRANSITIONS // CHECK_PERIOD
@@ -326,7 +360,10 @@ def _agent(explorer: str, forgetting: float) -> str:
 
 
 def plot(found: Cells) -> Any:
-    """Draw tries, value and error of changed actions over time: one row per change."""
+    """Draw tries, value and L1 error of the changed actions over the transitions, a row of panels for each change.
+
+    Returns a matplotlib figure.
+    """
     runs = runs_of(found)
     changes = [change for change in CHANGES if any(key[0] == change for key in runs)]
     drawing = new_figure(16.0, 4.0 * len(changes))

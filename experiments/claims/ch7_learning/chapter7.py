@@ -32,7 +32,7 @@ _TIMES, _FAILURE = "seconds.json", "failed.txt"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add --only, --all, and the options of a sweep, which are passed on to all experiments."""
+    """Add --only and --all, and the options --seeds, --jobs, --engine and --quick, which are passed on to all experiments."""
     parser.add_argument("--only", nargs="+", metavar="NAME", help=f"of {', '.join((*CHAPTER7, *BEYOND))}")
     parser.add_argument("--all", action="store_true", help=f"also {', '.join(BEYOND)}")
     parser.add_argument("--seeds", type=positive_whole, metavar="N", help="repetitions (default: each experiment's own)")
@@ -42,7 +42,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Run the experiments that have no results yet, and draw their figures."""
+    """Run the chosen experiments of chapter 7 that are not finished, and draw their figures.
+
+    Returns "parts", for each experiment its run time "minutes", its "figure" and, if it failed, the reason "failed"; the total "minutes";
+    and "passed", False if an experiment failed.  Raises UnknownName for a name after --only that is no experiment of the chapter.
+    """
     every = (*CHAPTER7, *BEYOND)
     names = [current_name(name) for name in arguments.only or (every if arguments.all else CHAPTER7)]
     for name in names:
@@ -59,7 +63,7 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 def figure(folder: Path) -> Path:
-    """Draw the figures of all finished experiments again; returns the folder that has a folder for each of them."""
+    """Draw the figures of all finished experiments again, and return `folder`, which has a folder for each experiment."""
     for results in sorted(folder.glob(f"*/{RESULTS}")):
         load_experiment(read(results.parent / CONFIG)["experiment"]).method.figure(results.parent)
     return folder
@@ -110,7 +114,10 @@ def _spent(place: Path, start: float) -> float:
 
 
 def options_of_part(name: str, arguments: argparse.Namespace) -> argparse.Namespace:
-    """Return the experiment's own default options, changed by those given for all."""
+    """Return the options for one experiment: its defaults, its seed, and the common options that were given for all.
+
+    The common options are --seeds, --jobs, --engine and --quick.
+    """
     parser = argparse.ArgumentParser()
     load_experiment(name).method.add_arguments(parser)
     options = parser.parse_args([])

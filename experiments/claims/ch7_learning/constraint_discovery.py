@@ -60,7 +60,11 @@ Action = tuple[int, int]  # source and goal state
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return one condition for each law, prior and discount; with --quick only for the first law, where each action is tried once."""
+    """Return the settings of the runs: one for each law, prior ("50-50", "60-40") and discount (0.5, 0.9, 0.99).
+
+    A law is the published control law, or the same law with another settle speed or cable force.  With --quick, only the published law is
+    run, and a run ends when each action was tried once instead of 5 times.
+    """
     least, name = (1, "quick-") if arguments.quick else (MIN_TRIES, "")
     return [
         Condition(f"{name}{number}-{initial}-g{discount:g}", {"law": law, "initial": initial, "discount": discount, "least": least})
@@ -70,7 +74,11 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Explore until every action was tried often enough; returns transitions (T, 3), tries and values (81, 8) at the end."""
+    """Explore until every action was tried 5 times (or as often as the setting `least` says), at most 20 000 transitions.
+
+    Returns `seen` (T, 3), the transitions: state, action, state reached; and for each of the (81, 8) actions its `tries` and its `values`
+    [nats] at the end.
+    """
     space, plant = arm_space(), arm_plant(seed, gains=LAWS[settings["law"]](Gains.published_2014()))
     begin_anywhere(space, plant, seed)
     agent = CuriousAgent(space, plant, seed=seed, discount=settings["discount"], initial=settings["initial"])
@@ -83,7 +91,10 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def summary(values: dict[str, Any]) -> dict[str, Any]:
-    """Reduce the values of a trial to visits (81,), failures and tries (81, 8), and the values at the end (81, 8) for the figure."""
+    """Reduce the values of `trial` for the raw record: counts replace the transitions `seen`.
+
+    Returns `visits` (81,) of the states, `failures` and `tries` (81, 8) of the actions, and the `values` (81, 8) [nats] at the end.
+    """
     space, seen = arm_space(), values["seen"]
     counts = {"visits": visits_of(space, seen), "failures": failures_of(space, seen), "tries": values["tries"]}
     return {name: count.astype(np.uint16) for name, count in counts.items()} | {"values": values["values"].astype(np.float16)}
@@ -91,7 +102,11 @@ def summary(values: dict[str, Any]) -> dict[str, Any]:
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """One exploration: visits (81,) of the states, failures and tries (81, 8) of the actions, and the values at the end (81, 8)."""
+    """The results of one exploration of the lattice `space`, which has 81 states with at most 8 actions.
+
+    `visits` (81,): how often each state was reached.  `tries`, `failures` (81, 8): how often each action was tried, and how often it did
+    not end in its goal state.  `values` (81, 8): values of the actions at the end [nats].
+    """
 
     space: Lattice
     visits: Ints
@@ -101,7 +116,7 @@ class Run:
 
     @property
     def transitions(self) -> float:
-        """The number of transitions."""
+        """The number of transitions of the run."""
         return float(self.visits.sum())
 
     @property
@@ -111,30 +126,30 @@ class Run:
 
     @property
     def exists(self) -> NDArray[np.bool_]:
-        """The entries of (81, 8) that are state-actions."""
+        """The mask (81, 8) of the actions that exist: states at the border of the lattice have fewer than 8."""
         return exists_in(self.space)
 
     @property
     def hard_visits(self) -> float:
-        """Mean visits of the hard states over those of all states."""
+        """The mean visits of the hard states 24, 51 and 78, divided by the mean visits of all states."""
         return float(self.visits[list(HARD)].mean() / self.visits.mean())
 
     def share_failed(self, actions: Sequence[Action]) -> float:
-        """Return the share of failures in all tries of these actions."""
+        """Return the share of failures in all tries of these actions, given as pairs of source and goal state."""
         at = tuple(np.array([self.index(action) for action in actions]).T)
         return float(self.failures[at].sum() / self.tries[at].sum())
 
     def relative_tries(self, actions: Sequence[Action]) -> float:
-        """Return the mean tries of these actions over those of all actions."""
+        """Return the mean tries of these actions (source, goal), divided by the mean tries of all actions."""
         return float(np.mean([self.tries[self.index(action)] for action in actions]) / self.tries[self.exists].mean())
 
     def index(self, action: Action) -> tuple[int, int]:
-        """Return row and column of an action in (81, 8)."""
+        """Return the row and column of an action (source, goal) in the arrays (81, 8)."""
         return action[0], int(np.flatnonzero(self.space.actions(action[0]) == action[1])[0])
 
     @property
     def out_of_hard(self) -> list[Action]:
-        """All actions of the hard states."""
+        """All actions that start in one of the hard states 24, 51 and 78, as pairs of source and goal state."""
         return [(state, int(goal)) for state in HARD for goal in self.space.actions(state)]
 
 
@@ -143,7 +158,7 @@ Laws = Mapping[str, Groups]
 
 
 def groups(found: Cells) -> Laws:
-    """Return the runs under each law, by seed."""
+    """Group the finished runs by law, and those of a law by (prior, discount); each group is sorted by seed."""
 
     def of(result: CellResult) -> Run:
         visits, failures, tries = (result.values[name].astype(np.intp) for name in ("visits", "failures", "tries"))
@@ -166,7 +181,10 @@ COLUMNS: dict[str, Callable[[Run], float]] = {
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return a row for each setting, and the claims if all settings of the published law were run."""
+    """Return the results: "runs" has a row for each law, prior and discount, "claims" the judged claims.
+
+    If a prior or discount of the published law was not run, the claims have no numbers.
+    """
     laws, rows = groups(found), {}
     for law, grouped in laws.items():
         for (initial, discount), runs in grouped.items():
@@ -340,7 +358,10 @@ CLAIMS = (*numbers, sooner, least_visited, fail, enter, spikes, dips, peaks, deg
 
 
 def plot(found: Cells) -> Any:
-    """Draw tries and values of every state-action as in figs. 7.6 and 7.7: one row per prior and discount, one colour per run."""
+    """Draw tries and values of every state-action under the published law, as in figs. 7.6 and 7.7.
+
+    The figure has a row of panels for each prior and discount, and a colour for each run.  Returns a matplotlib figure.
+    """
     grouped = groups(found)[PUBLISHED_LAW]
     drawing = new_figure(15.0, 2.3 * len(grouped))
     for panels, ((initial, discount), runs) in zip(drawing.subplots(len(grouped), 2, squeeze=False), grouped.items(), strict=True):

@@ -51,12 +51,16 @@ MAIN = next(iter(ARRANGEMENTS))
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add --arrangements."""
+    """Add the option --arrangements, which also runs the other arrangements of postures and cells."""
     parser.add_argument("--arrangements", action="store_true", help="also with other postures and another grid")
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return every agent in the main arrangement or in all; the short version makes 60 actions and two pushes."""
+    """Return the settings of the runs: each of four agents in the first arrangement, or with --arrangements in all three.
+
+    The agents differ in what they perceive as the cup, and one acts at random.  With --quick the runs have 60 actions and two tries to push
+    the cup to a cell.
+    """
     transitions, tries, name = (QUICK, 2, "quick-") if arguments.quick else (TRANSITIONS, TRIES, "")
     return [
         Condition(
@@ -71,10 +75,11 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Explore, then push.
+    """Explore beside the cup, and then try to push the cup to chosen cells.
 
-    Returns for each action whether it moved the cup (`moved`) and whether the cup fell (`fell`), the path of the cup [m]; and for each try
-    to push it to a cell whether it got there, by plans (`reached`), and of the random agent by random actions too (`by_chance`).
+    Returns for each of the T actions whether it moved the cup, `moved` (T,), and whether the cup fell, `fell` (T,); `path`, the length of
+    the cup's path [m]; and for each try to push the cup to a cell whether it got there, by plans in `reached` (tries,), and in runs of the
+    random agent by random actions in `by_chance` (tries,).
     """
     arrangement = ARRANGEMENTS[settings["arrangement"]]
     explorer, perceived = AGENTS[settings["agent"]]
@@ -114,7 +119,7 @@ Runs = Mapping[str, list[dict[str, Any]]]  # by agent
 
 
 def moves(run: Mapping[str, Any]) -> float:
-    """Return how many of 1000 actions moved the cup."""
+    """Return the number of actions that moved the cup, per 1000 actions; `run`: result of `trial`."""
     return 1000.0 * float(run["moved"].mean())
 
 
@@ -127,7 +132,10 @@ ROW: dict[str, Callable[[Mapping[str, Any]], float]] = {
 
 
 def pushed(runs: Runs) -> dict[str, list[float]]:
-    """Return the share of tries in which the cup got to its cell, of each run, by what chose the actions."""
+    """Return the share of tries of each run in which the cup got to the chosen cell, by what chose the actions.
+
+    The keys are "AGENT, then plans", for plans with what the agent has learned, and "random actions".
+    """
     learned = {f"{agent}, then plans": group for agent, group in runs.items()}
     return of_each(learned, lambda run: float(run["reached"].mean())) | {
         RANDOM: [float(run["by_chance"].mean()) for run in runs.get(RANDOM, [])]
@@ -135,7 +143,10 @@ def pushed(runs: Runs) -> dict[str, list[float]]:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return a row for each agent in each arrangement, and the claims if all were run in full in the first arrangement."""
+    """Return the results: "agents" has a row for each arrangement and agent, "claims" the judged claims.
+
+    If not every agent was run in full in the first arrangement, the claims have no numbers.
+    """
     groups = grouped_by(found, "arrangement", "agent")
     runs = {agent: groups[MAIN, agent] for agent in AGENTS if (MAIN, agent) in groups}
     whole = len(runs) == len(AGENTS) and len(runs[CUP][0]["moved"]) == TRANSITIONS
@@ -175,7 +186,10 @@ CLAIMS = (
 
 
 def plot(found: Cells) -> Any:
-    """Draw the moves of the cup over the actions, and the share of tries in which the cup got to its cell."""
+    """Draw how often the cup was moved over the number of actions, and the share of tries in which the cup got to the chosen cell.
+
+    Returns a matplotlib figure.
+    """
     groups, drawing = grouped_by(found, "arrangement", "agent"), new_figure(11.0, 4.2)
     runs = {agent: groups[MAIN, agent] for agent in AGENTS if (MAIN, agent) in groups}
     rates, shares = drawing.subplots(1, 2)

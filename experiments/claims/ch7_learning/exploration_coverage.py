@@ -79,7 +79,11 @@ Published = Mapping[tuple[str, str], Runs]  # runs on the published graph, by wo
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return every explorer on every graph in both worlds; the short version has only the equidistant graph."""
+    """Return the settings of the runs: every explorer on both graphs, for the arm with and without constraints.
+
+    On the published graph ("nearest") the curious agent also runs with the discounts 0.5 and 0.99.  With --quick only the graph of
+    equidistant neighbours is explored.
+    """
     few = tuple(range(arguments.seed, arguments.seed + min(arguments.seeds, FEW_SEEDS)))
     published = [("nearest", *one, DISCOUNT) for one in product(WORLDS, EXPLORED_BY)]
     published += [("nearest", world, "curious", discount) for world, discount in product(WORLDS, OTHER_DISCOUNTS)]
@@ -96,9 +100,12 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Explore until every action was tried.
+    """Explore until every action was tried, at most 20 000 transitions.
 
-    Returns among others `new_actions` and `new_states`, the transitions, counted from 1, that tried a new action or reached a new state.
+    Returns `state_actions`, the number of actions; `floor`, the length of the shortest walk over all of them; `new_actions` (E,), the
+    numbers (from 1) of the transitions that tried an action for the first time; `new_states`, the numbers of the transitions that reached a
+    state for the first time, and 0 for the state at the start; the number of `transitions`; and `failed`, the share that did not end in
+    their goal.
     """
     space = arm_space(neighbours=GRAPHS[settings["graph"]], tie_seed=seed)
     plant = arm_plant(seed, free=settings["world"] == "free")
@@ -118,13 +125,14 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def shortest_walk(goals: Ints) -> int:
-    """Return the length of the shortest walk over every action of a graph, between any two states, if all actions succeed.
+    """Return the number of actions of the shortest walk over every action of a graph, between any two states, if all succeed.
 
-    Where more actions lead into a state than out of it, the walk has to leave it along actions that it has taken before: it takes a
-    shortest path to a state that more actions leave than enter.  A minimal assignment pairs these states; one pair may stay unconnected,
-    the walk's ends.  This is the open directed Chinese postman's walk.
+    `goals` (S, A): goal state of each action, -1 where there is no action.  Raises InvalidValue unless every state can be reached from
+    every other state.
 
-    `goals`: (S, A), -1 where there is no action.  Raises InvalidValue unless every state can be reached from every other.
+    This is the open directed Chinese postman's walk.  If more actions lead into a state than out of it, the walk must leave this state by
+    actions that it has already taken: it takes a shortest path to a state with more actions out of it than into it.  A minimal assignment
+    pairs these states.  One pair needs no path: the walk begins and ends there.
     """
     from_state, action = np.nonzero(goals != NO_ACTION)
     to_state, states = goals[from_state, action], len(goals)
@@ -146,7 +154,10 @@ def _distances(from_state: Ints, to_state: Ints, states: int) -> Array:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return a row for each graph, world and agent, and the claims about the graph "nearest", as published, if it was run."""
+    """Return the results: "runs" has a row for each graph, world and agent; "claims" has the judged claims.
+
+    The claims are about the published graph, "nearest", and are absent if it was not run.
+    """
     grouped = by_agent(found)
     results: dict[str, Any] = {"runs": {" ".join(key): row(runs) for key, runs in sorted(grouped.items())}}
     published = {key[1:]: runs for key, runs in grouped.items() if key[0] == "nearest"}
@@ -154,7 +165,10 @@ def findings(found: Cells) -> dict[str, Any]:
 
 
 def by_agent(found: Cells) -> dict[tuple[str, str, str], Runs]:
-    """Return the runs by graph, world and agent: the explorer, with its discount if that is not the usual one."""
+    """Group the values of the finished runs by (graph, world, agent), each group sorted by seed.
+
+    The agent is the name of its explorer, followed by the discount if this is not 0.9: "curious", "curious 0.5".
+    """
     grouped = grouped_by(found, "graph", "world", "explorer", "discount")
     return {(graph, world, _agent(explorer, discount)): runs for (graph, world, explorer, discount), runs in grouped.items()}
 
@@ -164,13 +178,20 @@ def _agent(explorer: str, discount: float) -> str:
 
 
 def summary(values: dict[str, Any]) -> dict[str, Any]:
-    """Reduce the values of a trial: `gaps`, the transitions from each new action to the next, are mostly 1 and take little space."""
+    """Reduce the values of `trial` for the raw record: `gaps` replaces `new_actions`.
+
+    `gaps` (E,) is the number of transitions from each first try of an action to the first try of the next new action.  Most gaps are 1, so
+    they take little space.
+    """
     kept = {name: value for name, value in values.items() if name != "new_actions"}
     return kept | {"gaps": np.diff(values["new_actions"].astype(np.intp), prepend=0).astype(np.uint16)}
 
 
 def covered(runs: Runs) -> Array:
-    """Return, for each run, the transitions until every action was tried; for an unfinished run, all its transitions."""
+    """Return, for each of the N runs, the number of transitions until every action was tried, (N,).
+
+    For a run in which some action was never tried, this is the number of all its transitions.
+    """
     return np.array([run["transitions"] for run in runs], dtype=np.float64)
 
 
@@ -180,18 +201,18 @@ def unfinished(runs: Runs) -> int:
 
 
 def first_repeat(run: Mapping[str, Any]) -> int:
-    """Return the first transition whose action had been tried before, counted from 1."""
+    """Return the number, counted from 1, of the first transition with an action that had already been tried."""
     later = np.flatnonzero(run["gaps"] != 1)
     return int(later[0]) + 1 if len(later) else len(run["gaps"]) + 1
 
 
 def states_seen(run: Mapping[str, Any], transitions: int) -> int:
-    """Return the number of states that were visited in the first `transitions`."""
+    """Return the number of states that a run visited in its first `transitions` transitions, with the state at the start."""
     return int((run["new_states"] <= transitions).sum())
 
 
 def row(runs: Runs) -> dict[str, Any]:
-    """Return the numbers of a condition."""
+    """Return the row of results for runs with the same settings, by label: numbers of runs, transitions, repeats, states, failures."""
     low, high = interval(covered(runs))
     return {
         "seeds": len(runs),
@@ -300,7 +321,7 @@ near_floor = {
     "at most 1.01",
 )
 def depletes(published: Published) -> Measured | None:
-    """Compare the two explorers in both worlds; open where an interval does not decide, or a world was not run."""
+    """Compare the explorers "depleting" and "nearest_untried" in both worlds; returns None if one of them was not run."""
     if any((world, name) not in published for world in FLOORS for name in ("depleting", "nearest_untried")):
         return None
     times = {world: [covered(published[world, name]) for name in ("depleting", "nearest_untried")] for world in FLOORS}
@@ -317,7 +338,10 @@ MIN_DETOUR = 1e-3  # that is drawn
 
 
 def plot(found: Cells) -> Any:
-    """Draw untried state-actions over transitions (fig. 4), states seen early, and each run's detour: one row per graph."""
+    """Draw untried actions over transitions (fig. 4), states visited early, and by how much each run exceeds the shortest walk.
+
+    The figure has a row of panels for each graph.  Returns a matplotlib figure.
+    """
     grouped = by_agent(found)
     graphs = [graph for graph in TITLES if any(key[0] == graph for key in grouped)]
     drawing = new_figure(16.0, 3.8 * len(graphs))

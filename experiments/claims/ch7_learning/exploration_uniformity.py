@@ -39,12 +39,15 @@ AS_UNIFORM = 1.1  # ratio of Gini coefficients up to which one counts as no less
 
 @cache
 def space_of(graph: str) -> Lattice:
-    """Return the lattice of a graph."""
+    """Return the lattice of 81 states of the left arm; `graph`: "nearest" (16 neighbours) or "equidistant" (neighbours)."""
     return arm_space(neighbours=ARM_NEIGHBOURS if graph == "nearest" else "equidistant")
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return every explorer on every graph; the short version makes fewer transitions."""
+    """Return the settings of the runs: every explorer on every graph.
+
+    With --quick the runs have 1500 transitions instead of 4000.
+    """
     count = FEW if arguments.quick else TRANSITIONS
     return [
         Condition(f"{graph}-{explorer}-n{count}", {"graph": graph, "explorer": explorer, "transitions": count})
@@ -53,7 +56,7 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Explore; returns the transitions (T, 3)."""
+    """Explore one graph with one explorer; returns the transitions `seen` (T, 3): state, action, state reached."""
     space, plant = space_of(settings["graph"]), arm_plant(seed)
     begin_anywhere(space, plant, seed)
     agent = CuriousAgent(space, plant, settings["explorer"], seed)
@@ -61,12 +64,12 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def summary(values: dict[str, Any]) -> dict[str, Any]:
-    """Sort the transitions, whose order is not needed."""
+    """Reduce the values of `trial` for the raw record: the transitions `seen` are sorted, because only their counts are needed."""
     return {"seen": in_order(values["seen"])}
 
 
 def groups(found: Cells) -> Groups:
-    """Return the runs of each graph and explorer, by seed."""
+    """Group the counts (tries, failures and visits) of the finished runs by (graph, explorer); each group is sorted by seed."""
     return explored(found, space_of, "graph", "explorer")
 
 
@@ -150,7 +153,10 @@ COLUMNS: dict[str, Callable[[Explored], float]] = {
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return a row for each graph and explorer, and the claims."""
+    """Return the results: "runs" has a row for each graph and explorer, "claims" the judged claims.
+
+    If not every explorer was run on every graph, the claims have no numbers.
+    """
     grouped, rows = groups(found), {}
     for (graph, explorer), runs in grouped.items():
         spikes = _spikes(grouped, graph, explorer)
@@ -168,7 +174,10 @@ TITLES = {"curious": "curious (AC)", "least_tried": "least tried (LT)", "random"
 
 
 def plot(found: Cells) -> Any:
-    """Draw visits and tries of one run of each explorer, as in fig. 5: one row per explorer."""
+    """Draw the visits of all states and the tries of all actions in one run of each explorer, as in fig. 5.
+
+    The figure has a row of panels for each explorer, on the graph of the 16 nearest neighbours.  Returns a matplotlib figure.
+    """
     shown = _of_graph(groups(found), "nearest")
     drawing = new_figure(13.0, 2.4 * len(shown))
     panels = drawing.subplots(len(shown), 2, squeeze=False, sharex="col", sharey="col", width_ratios=(1, 3))

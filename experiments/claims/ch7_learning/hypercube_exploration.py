@@ -51,12 +51,20 @@ Priors = Mapping[str, Groups]  # by initialisation
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return every initialisation and discount; there is no shorter version."""
+    """Return the settings of the runs: both initialisations ("50-50", "60-40") with the discounts 0.5, 0.9 and 0.99.
+
+    The runs are so short that --quick changes nothing.
+    """
     return grid(initial=INITIAL, discount=DISCOUNTS)
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Explore until every action was tried 5 times; returns tries and values (16, 4), early and at the end."""
+    """Explore the hypercube until every action was tried 5 times, at most 5050 transitions.
+
+    Returns for the (16, 4) actions their tries and values [nats] after 50 transitions, `early_tries` and `early_values`, and at the end,
+    `tries`, `values` and expected `rewards`; the transitions `seen` (T, 3), their number `transitions`, and how many of them `failed`; and
+    `all_once`, the number of transitions until every action was tried once (None: not every one was).
+    """
     space, plant = arm_space(HYPERCUBE), arm_plant(seed)
     begin_anywhere(space, plant, seed)
     agent = CuriousAgent(space, plant, seed=seed, discount=settings["discount"], initial=settings["initial"])
@@ -82,7 +90,11 @@ def _values(agent: CuriousAgent) -> Array:
 
 
 def relative_variance(tries: Array) -> float:
-    """Return the variance of tries over that of a uniformly random choice of state-actions: 1 if random, 0 if all are equal."""
+    """Return the variance of the tries of actions, divided by its expected value if actions are chosen uniformly at random.
+
+    `tries`: number of tries of each action, any shape.  0 means that all actions were tried equally often, about 1 that they were chosen at
+    random.
+    """
     count, total = tries.size, tries.sum()
     return float(tries.var() / (total / count * (1.0 - 1.0 / count)))
 
@@ -166,7 +178,7 @@ CLAIMS = (succeed, actions, uniform, flat, proportional)
 
 
 def by_prior(found: Cells) -> Priors:
-    """Return the runs of each initialisation and discount."""
+    """Group the values of the finished runs by initialisation ("50-50", "60-40"), then by discount; each group is sorted by seed."""
     grouped = grouped_by(found, "initial", "discount")
     return {
         initial: {d: grouped[initial, d] for d in DISCOUNTS if (initial, d) in grouped}
@@ -176,7 +188,7 @@ def by_prior(found: Cells) -> Priors:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return a row for each initialisation and discount, and the claims."""
+    """Return the results: "runs" has a row for each initialisation and discount, "claims" the judged claims."""
     priors = by_prior(found)
     return {
         "runs": {f"{i}, discount {d:g}": _row(d, runs) for i, groups in priors.items() for d, runs in groups.items()},
@@ -207,7 +219,10 @@ COLUMNS = (
 
 
 def plot(found: Cells) -> Any:
-    """Draw tries and values of every state-action as in figs. 7.2 and 7.3: one row per discount, one colour per run."""
+    """Draw tries and values of every state-action with the initialisation 50-50, as in figs. 7.2 and 7.3.
+
+    The figure has a row of panels for each discount, and a colour for each run.  Returns a matplotlib figure.
+    """
     groups = by_prior(found)[INITIAL[0]]
     drawing = new_figure(14.0, 2.6 * len(groups))
     for panels, (discount, runs) in zip(drawing.subplots(len(groups), 4, squeeze=False), groups.items(), strict=True):

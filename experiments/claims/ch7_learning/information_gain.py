@@ -44,19 +44,22 @@ SAME_REWARD = 1.05  # ratio of rewards up to which they count as the same
 
 @cache
 def space_of(part: str) -> Lattice:
-    """Return the lattice of a part: 81 states with 16 neighbours, or 27 with 8."""
+    """Return the lattice of a part: 81 states with 16 neighbours for "left_arm", 27 with 8 for "torso"."""
     return torso_space() if part == "torso" else arm_space(neighbours=ARM_NEIGHBOURS)
 
 
 def plant_of(part: str, seed: int) -> OfflinePlant:
-    """Return a plant in which only the part's motors move, without objects."""
+    """Return an offline plant without objects in which only the motors of the part, "left_arm" or "torso", move."""
     if part == "torso":
         return OfflinePlant(Model(robot()), seed, Gains.published_2014(), dt=DT, active=TORSO)
     return arm_plant(seed)
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return both parts with both divergences; the short version makes fewer transitions."""
+    """Return the settings of the runs: both parts with both divergences.
+
+    With --quick the runs have fewer transitions: 1000 of the arm and 300 of the torso.
+    """
     counts = FEW if arguments.quick else TRANSITIONS
     return [
         Condition(f"{part}-{divergence}-n{counts[part]}", {"part": part, "divergence": divergence, "transitions": counts[part]})
@@ -65,7 +68,11 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Explore; returns the transitions (T, 3), their rewards (T,), and the expected reward of an action before any try."""
+    """Let a curious agent explore with one part and one divergence as reward.
+
+    Returns the transitions `seen` (T, 3): state, action, state reached; their `rewards` (T,) [nats]; and `first_reward`, the largest
+    expected reward of an action before any try.
+    """
     part, divergence = settings["part"], settings["divergence"]
     space, plant = space_of(part), plant_of(part, seed)
     begin_anywhere(space, plant, seed)
@@ -87,17 +94,17 @@ Outcome = Callable[[np.random.Generator, int], int]  # draws the state in which 
 
 
 def reliable(rng: np.random.Generator, goal: int) -> int:
-    """Return the outcome of a reliable action: the goal."""
+    """Return the state in which a reliable action ends: always its goal."""
     return goal
 
 
 def failing(rng: np.random.Generator, goal: int) -> int:
-    """Return the outcome of a failing action: always the same other state."""
+    """Return the state in which a failing action ends: always the same state, which is not its goal."""
     return (goal + 7) % 27
 
 
 def uncertain(rng: np.random.Generator, goal: int) -> int:
-    """Return the outcome of an uncertain action: the goal or one of two other states, with equal probability."""
+    """Return the state in which an uncertain action ends: its goal or one of two other states, with equal probability."""
     return (goal, (goal + 7) % 27, (goal + 11) % 27)[int(rng.integers(3))]
 
 
@@ -105,7 +112,10 @@ KINDS: dict[str, Outcome] = {"reliable": reliable, "failing": failing, "uncertai
 
 
 def rewards(part: str, divergence: str, outcome: Outcome, repeats: int = REPEATS) -> Array:
-    """Return the rewards of 30 tries of one action, (repeats, 30)."""
+    """Simulate 30 tries of one action, and return the reward of each try [nats], (repeats, 30).
+
+    `part`: the part whose states are used.  `divergence`: the reward, "kail" or "kl".  `outcome`: draws the state in which the action ends.
+    """
     space, rng = space_of(part), np.random.default_rng(0)
     goal = int(space.goals[0, 0])
     received = np.empty((repeats, TRIES))
@@ -117,9 +127,10 @@ def rewards(part: str, divergence: str, outcome: Outcome, repeats: int = REPEATS
 
 
 def tries_to_prefer(part: str, divergence: str, kind: str) -> float:
-    """Return the mean number of tries of both actions until one of this kind had a larger last reward than a reliable one.
+    """Return the mean number of tries after which an action of the kind `kind` has a larger reward than a reliable action.
 
-    Infinite if 30 tries do not suffice in some repetition.
+    Both actions are tried equally often, and their last rewards are compared; larger means by more than 5 %.  `part`, `divergence`: as in
+    `rewards`.  `kind`: "failing" or "uncertain".  inf if 30 tries do not suffice in some repetition.
     """
     other = rewards(part, divergence, KINDS[kind])
     plain = rewards(part, divergence, reliable, repeats=1)[0]
@@ -129,12 +140,15 @@ def tries_to_prefer(part: str, divergence: str, kind: str) -> float:
 
 
 def groups(found: Cells) -> Groups:
-    """Return the runs of each part and divergence, by seed."""
+    """Group the counts (tries, failures and visits) of the finished runs by (part, divergence); each group is sorted by seed."""
     return explored(found, space_of, "part", "divergence")
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return a row for each part and divergence, and the claims."""
+    """Return the results: "runs" has a row for each part and divergence, "claims" the judged claims.
+
+    If not every part was run with every divergence, the claims have no numbers.
+    """
     grouped = groups(found)
     rows = {
         f"{PARTS[part]}, {DIVERGENCES[divergence]}": {
@@ -218,7 +232,10 @@ SMOOTH = 50  # transitions
 
 
 def plot(found: Cells) -> Any:
-    """Draw computed rewards, rewards of both parts over time, and tries of failing actions: one row per divergence."""
+    """Draw the computed rewards of single actions, the rewards of both parts over time, and the tries of failing actions.
+
+    The figure has a row of panels for each divergence.  Returns a matplotlib figure.
+    """
     grouped = groups(found)
     drawing = new_figure(14.0, 6.0)
     panels = drawing.subplots(2, 3, squeeze=False)

@@ -63,7 +63,7 @@ LIVE_COST = 5.0  # of a live run, relative to an offline one
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options of a sweep, --live-seeds, --robots and --transitions."""
+    """Add the options of a sweep, and --live-seeds, --robots and --transitions."""
     sweep_arguments(parser, seeds=SEEDS)
     text = f"live runs on each robot, one after the other (default: {LIVE_SEEDS})"
     parser.add_argument("--live-seeds", type=positive_whole, default=LIVE_SEEDS, metavar="N", help=text)
@@ -73,14 +73,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def offline_cells(arguments: argparse.Namespace) -> list[Cell]:
-    """Return the offline seeds."""
+    """Return the cells that learn on the offline plant: one for each seed, at least two."""
     number = _transitions(arguments)
     seeds = range(arguments.seed, arguments.seed + max(2, arguments.seeds))
     return [Cell(f"{TASK}-n{number}-s{seed}", seed, {"task": TASK, "transitions": number}) for seed in seeds]
 
 
 def live_cells(arguments: argparse.Namespace) -> list[Cell]:
-    """Return the live seeds of each robot, all robots of a seed before the next seed."""
+    """Return the cells that learn on the live system: one for each robot and seed; all robots run a seed before the next seed.
+
+    With --quick there is one seed.
+    """
     number, seeds = _transitions(arguments), range(LIVE_SEED, LIVE_SEED + (1 if arguments.quick else arguments.live_seeds))
     return [
         Cell(f"{robot}-n{number}-s{seed}", seed, {"task": TASK, "transitions": number, "robot": robot}, LIVE_COST)
@@ -90,7 +93,10 @@ def live_cells(arguments: argparse.Namespace) -> list[Cell]:
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Learn offline and live, and compare."""
+    """Learn on the offline plant and on the live system, and return the results of the comparison.
+
+    Live cells run one after the other.  Cells that are already in the folder are not repeated.
+    """
     run_cells(learn_offline, offline_cells(arguments), folder, arguments)
     one_by_one = copy(arguments)
     one_by_one.jobs = 1
@@ -99,7 +105,11 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 def learn_in_system(cell: Cell) -> dict[str, Any]:
-    """Learn live in a cell with the settings `task`, `transitions` and `robot`; returns what `learn_offline` does."""
+    """Learn on the live system, in a cell with the settings `task`, `transitions` and `robot`.
+
+    Returns for each part the transitions, `seen_PART` (T, 3), and whether each ended in contact with an object, `touched_PART` (T,): the
+    same arrays as `experiments.kit.learning.live.learn_offline`.
+    """
     task, number = str(cell.settings["task"]), int(cell.settings["transitions"])
     with tempfile.TemporaryDirectory() as scratch:
         learn_live(task, cell.settings["robot"], cell.seed, number, Path(scratch), lambda made: None, PIECE)
@@ -108,39 +118,42 @@ def learn_in_system(cell: Cell) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Run:
-    """One run, offline or live."""
+    """One run of the three agents, offline or live; `result`: the finished cell with their transitions."""
 
     result: CellResult
 
     @cached_property
     def counts(self) -> Counts:
-        """How often each state-action ended in each state, by part."""
+        """How often each action ended in each state, (S, A, S), by part."""
         return {part: counts_of(self.result.values[f"seen_{part}"], lattice) for part, lattice in _spaces().items()}
 
     @property
     def touch(self) -> float:
-        """The share of the arms' actions that ended in contact with table or ball, in the second half."""
+        """The share of the arms' actions in the second half of the run that ended in contact with table or ball."""
         return float(np.mean([_late(self.result.values[f"touched_{arm}"]).mean() for arm in ARMS]))
 
     @property
     def lean(self) -> float:
-        """Mean tries of the torso's actions that lean forward over those of its other actions, in the second half."""
+        """How often the torso leans forward, in the second half of the run: mean tries of these actions over those of its other actions."""
         lattice = _spaces()["torso"]
         tries = counts_of(_late(self.result.values["seen_torso"]), lattice).sum(axis=-1)
         forward = (lattice.goals >= FORWARD_STATES.start) & (lattice.goals < FORWARD_STATES.stop)
         return float(tries[forward].mean() / tries[~forward].mean())
 
     def contacts(self, part: str) -> Contacts:
-        """Return how the actions of a part ended."""
+        """Return how many actions of a part missed their goals, ended in contact with an object, or both."""
         return Contacts.of(_spaces()[part], self.result.values[f"seen_{part}"], self.result.values[f"touched_{part}"])
 
 
 Runs = Mapping[str, list[Run]]
-"""The runs of each robot, and offline."""
+"""The runs on each robot, by its name, and those on the offline plant under "offline"; each list is sorted by seed."""
 
 
 def runs_in(folder: Path) -> Runs:
-    """Return all finished runs; raises InvalidValue unless two offline seeds are finished."""
+    """Return all finished runs in a folder, by robot, with those on the offline plant under "offline".
+
+    Raises InvalidValue if fewer than two offline seeds are finished.
+    """
     runs: dict[str, list[Run]] = {}
     for result in sorted(load_cells(folder).values(), key=lambda one: one.cell.seed):
         runs.setdefault(result.cell.settings.get("robot", OFFLINE), []).append(Run(result))
@@ -150,9 +163,10 @@ def runs_in(folder: Path) -> Runs:
 
 
 def distances(runs: Runs) -> dict[str, list[Distance]]:
-    """Return how far each run is from the offline seeds.
+    """Return how far the outcomes of each run are from those of the offline runs, by robot, in the order of the runs.
 
-    An offline seed is compared with all others together; a live run with all but one, averaged over the seed left out.
+    An offline run is compared with all other offline runs together.  A live run is compared with all offline runs except one, and the
+    distance is averaged over the run that is left out.
     """
     offline = [run.counts for run in runs[OFFLINE]]
     together = {part: np.sum([counts[part] for counts in offline], axis=0) for part in offline[0]}
@@ -166,7 +180,10 @@ def distances(runs: Runs) -> dict[str, list[Distance]]:
 
 
 class Found(NamedTuple):
-    """All finished runs, and how far each is from the offline seeds."""
+    """All finished runs, with their distances from the offline runs.
+
+    `runs`: by robot, and under "offline".  `apart`: distance of each of these runs, in the same order.
+    """
 
     runs: Runs
     apart: Mapping[str, list[Distance]]
@@ -176,7 +193,10 @@ NUMBERS: dict[str, Callable[[Run], float]] = {"touch": lambda run: run.touch, "l
 
 
 def results(folder: Path) -> dict[str, Any]:
-    """Compute the numbers and the claims from the transitions in the folder."""
+    """Compute the results from the finished cells in the folder: the claims, and rows for the runs and for contacts at the table.
+
+    Raises InvalidValue if fewer than two offline seeds are finished.
+    """
     runs = runs_in(folder)
     apart = distances(runs)
     return {
@@ -258,7 +278,10 @@ def _live(groups: Mapping[str, Any]) -> list[str]:
 
 
 def figure(folder: Path) -> Path:
-    """Draw the distance of every run from the offline ones, and how often it touched the table and leant forward."""
+    """Draw the distance of every run from the offline runs, and how often its agents touched the table and leant forward.
+
+    Returns the path of the picture in the folder.
+    """
     runs = runs_in(folder)
     panels = {"mean total variation a state-action": {name: [d.variation for d in group] for name, group in distances(runs).items()}}
     panels["share of the arms' actions that end at the table"] = of_each(runs, NUMBERS["touch"])

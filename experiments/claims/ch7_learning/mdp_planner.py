@@ -63,14 +63,24 @@ MOST = 0.5  # share of the state-actions
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return learning without the table, with one that moves, and with one that enters (with and without forgetting); and roadmaps."""
+    """Return the settings of the runs: what the agent learns with, and the roadmaps that need no learning.
+
+    The agent learns without the table ("still"), with a table that moves ("moving"), or with one that enters ("enters", with and without
+    forgetting).  With --quick there are 10 queries instead of 60, and a quarter of the transitions.
+    """
     settings: dict[str, Any] = {"queries": 10, "share": 0.25} if arguments.quick else {"queries": QUERIES, "share": 1.0}
     lasting = [Condition(condition, settings | {"training": condition}) for condition in ("still", "moving", "roadmap")]
     return lasting + [Condition(f"enters-{f:g}", settings | {"training": "enters", "forgetting": f}, 2.0) for f in ENTERS]
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Learn with a seed, then follow plans to random goals; returns the means over these goals."""
+    """Learn with one kind of table, then send the arm to the goals of the queries by plans.
+
+    Returns `tests`: the measures by kind of planner ("plans" of the MDP, or roadmaps "planned once", "repairs", "remembers") and by
+    position of the table ("down", "moving", "up").  After learning without the table or with one that moves, also the transitions `seen`
+    (T, 3), the counts of `fates`, and the model's `outcomes` and `probabilities` (S, A, B).  If the table enters, returns instead `rows`,
+    the measures with the raised table, and `after`, the numbers of transitions since it entered.
+    """
     condition, share, space = settings["training"], settings["share"], arm_space(RANK3, ARM_NEIGHBOURS)
     plant = TablePlant(seed, moves=condition == "moving")
     queries = Queries.of_seed(plant, space, settings["queries"], seed)
@@ -81,7 +91,7 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def summary(values: dict[str, Any]) -> dict[str, Any]:
-    """Sort the transitions of an agent, whose order is not needed."""
+    """Reduce the values of `trial` for the raw record: transitions `seen` are sorted, because only their counts are needed."""
     return values | ({"seen": in_order(values["seen"]).astype(np.uint8)} if "seen" in values else {})
 
 
@@ -108,7 +118,11 @@ def _entered(agent: CuriousAgent, plant: TablePlant, queries: Queries, share: fl
 
 
 def fates(model: TransitionModel) -> dict[str, int]:
-    """Count the state-actions, among those tried often enough, that always reach their goal, always another state, or vary."""
+    """Count the state-actions that were tried at least twice, by where they end with a probability of at least 0.8.
+
+    The keys are "tried", for all of them; "goal", for those that end in their goal; "elsewhere", for those that end in one other state; and
+    "sometimes", for those in which no state has this probability.
+    """
     beliefs, space = model.debiased(), model.space
     tried = model.tries >= MIN_TRIES
     probabilities = np.array(beliefs.probabilities)
@@ -124,7 +138,10 @@ Runs = Mapping[tuple[str, float | None], list[dict[str, Any]]]  # values by cond
 
 
 def runs_of(found: Cells) -> Runs:
-    """Return the values of the finished runs of each condition, by seed."""
+    """Group the values of the finished runs by (training, forgetting), each group sorted by seed.
+
+    Training is "still", "moving", "enters" or "roadmap"; forgetting is None except for "enters".
+    """
     runs: dict[tuple[str, float | None], list[dict[str, Any]]] = {}
     for result in sorted(found.values(), key=lambda result: result.cell.seed):
         settings = result.cell.settings
@@ -133,24 +150,36 @@ def runs_of(found: Cells) -> Runs:
 
 
 def tested(runs: Runs, condition: str, test: str, measure: str, mode: str = "plans") -> Array:
-    """Return a measure of each seed; `mode`: "plans" of the MDP, or one of the ROADMAPS."""
+    """Return a measure of the plans of each run, (seeds,).
+
+    `condition`: "still", "moving" or "roadmap".  `test`: position of the table, "down", "moving" or "up".  `measure`: "success", "actions",
+    "touched", "met" or, for the MDP, "promised", "kept" or "through".  `mode`: "plans" for the MDP; for a roadmap "planned once", "repairs"
+    or "remembers".
+    """
     return np.array([run["tests"][mode][test][measure] for run in runs[condition, None]])
 
 
 def entering(runs: Runs, forgetting: float) -> tuple[list[int], dict[str, Array]]:
-    """Return the transitions since the table entered, and each measure then (seeds, points)."""
+    """Return the numbers of transitions since the table entered, and by name the measures of plans after them, (seeds, points).
+
+    `forgetting`: the factor with which the agents forget; 1: nothing is forgotten.
+    """
     group = runs["enters", forgetting]
     return list(group[0]["after"]), {m: np.array([[point[m] for point in run["rows"]] for run in group]) for m in MEASURES}
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the claims, and the tables of plans that were executed."""
+    """Return the results: "claims" with the judged claims, and the tables of `tables`."""
     runs = runs_of(found)
     return {"claims": judged(CLAIMS, runs), **tables(runs)}
 
 
 def tables(runs: Runs) -> dict[str, Any]:
-    """Return a row for each planner and world, and for each time since the table entered."""
+    """Return two tables of measures: "plans executed" and "after the table entered".
+
+    The first has a row for each planner and position of the table.  The second has a row for each factor of forgetting and number of
+    transitions since the table entered.
+    """
     executed = [
         {"planner": name, "table": test}
         | {
@@ -244,7 +273,10 @@ LEVEL_NAMES = ("123", "abc", ("I", "II", "III"), "ABC")  # of pitch, roll, yaw a
 
 
 def plot(found: Cells) -> Any:
-    """Draw the learned models as in fig. 7, the plans with a moving table, and their recovery after a table has entered."""
+    """Draw the learned models as in fig. 7, the success of plans with the table, and their recovery after a table has entered.
+
+    Returns a matplotlib figure.  Raises InvalidValue if there are no finished runs of some kind of training.
+    """
     runs = runs_of(found)
     if not runs.keys() >= {*((condition, None) for condition in ("still", "moving", "roadmap")), *(("enters", f) for f in ENTERS)}:
         raise InvalidValue("some cells are not finished: continue the run with --resume.")
@@ -280,10 +312,11 @@ def _entering(axes: Any, runs: Runs, measure: str) -> None:
 
 
 def draw_arrows(axes: Any, space: Lattice, outcomes: Ints, probabilities: Array) -> None:
-    """Draw the transition model of a rank 3 arm, `outcomes` and `probabilities` (S, A, B), as in fig. 7 of the paper.
+    """Draw the transition model of a rank 3 arm as in fig. 7 of the paper: states as points, outcomes as arrows.
 
-    Pitch and elbow vary within a block, roll and yaw from block to block.  Each arrow is a probability.  Grey: state-actions that end in
-    their goal, or where they start; each colour: one state-action that ends in another state.
+    `outcomes`, `probabilities`: (S, A, B).  Pitch and elbow vary within a block, roll and yaw from block to block.  Grey lines are all
+    state-actions.  A state-action with a probability of at least 0.3 of ending neither in its goal nor where it starts has a colour of its
+    own, and an arrow to each other state with a probability of 0.08 or more; the width of an arrow is the probability.
     """
     from matplotlib import colormaps
     from matplotlib.collections import LineCollection

@@ -41,9 +41,10 @@ from mobee.learning.value_iteration import OutcomeModel
 
 @dataclass(frozen=True)
 class World:
-    """A lattice, its explorers and their number of transitions.
+    """A lattice with the explorers that run on it.
 
-    `tries`: number of tries of each action in the walks that measure the true outcomes; 0 if a table gives them.
+    `text`: name in tables.  `levels`: samples of each joint, as shares of its range.  `explorers`: names of explorers.  `transitions`:
+    length of their runs.  `tries`: tries of each action in the walks that measure the true outcomes; 0 if a table defines the outcomes.
     """
 
     text: str
@@ -70,23 +71,26 @@ COUNTS, DEBIASED, DEBIASED_STOCHASTIC = 0, 2, 3
 
 @cache
 def space_of(world: str) -> Lattice:
-    """Return the lattice of a world, with equidistant neighbours."""
+    """Return the lattice of a world ("half-space", "rank3" or "rank4"), with equidistant neighbours."""
     return arm_space(WORLDS[world].levels)
 
 
 def plant_of(world: str) -> Callable[[int], Plant]:
-    """Return the function that makes the world's plant from a seed."""
+    """Return the function that makes the plant of a world ("half-space", "rank3" or "rank4") from a seed."""
     return arm_plant if WORLDS[world].tries else half_space_plant
 
 
 def half_space_plant(seed: int) -> TabularPlant:
-    """Return the plant with a half-space obstacle that separates the states 24, 51 and 78 from the other states."""
+    """Return a tabular plant of 81 states in which a half-space separates the states 24, 51 and 78 from the others."""
     space = space_of("half-space")
     return TabularPlant(space, *half_space(space), seed)
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return the walks that measure the arm's true outcomes, and every explorer in its worlds; --quick: only the half-space."""
+    """Return the settings of the runs: walks that measure the arm's true outcomes, and every explorer in its worlds.
+
+    With --quick only the world "half-space" is explored, which needs no walk.
+    """
     worlds = {name: world for name, world in WORLDS.items() if not (arguments.quick and world.tries)}
     walks = [
         Condition(f"truth-{name}", {"world": name, "explorer": WALK}, cost=8.0, seeds=WALKS)
@@ -102,7 +106,10 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Explore; returns the transitions (T, 3)."""
+    """Explore one world with an explorer or, to measure the true outcomes, by a walk.
+
+    Returns the transitions `seen` (T, 3): state, action, state reached.
+    """
     name, explorer = settings["world"], settings["explorer"]
     space, world, plant = space_of(name), WORLDS[name], plant_of(name)
     if explorer == WALK:
@@ -113,7 +120,10 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def truths(found: Cells) -> dict[str, OutcomeModel]:
-    """Return the true outcomes of each world: the half-space's own table, and the arm's as far as its walks are finished."""
+    """Return the true outcomes by world: a table for the half-space, frequencies in the finished walks for the arm.
+
+    A world of the arm without a finished walk is absent.
+    """
     known: dict[str, OutcomeModel] = {"half-space": half_space_plant(0)}
     for (world, explorer), walks in grouped_by(found, "world", "explorer").items():
         if explorer == WALK:
@@ -122,7 +132,10 @@ def truths(found: Cells) -> dict[str, OutcomeModel]:
 
 
 def errors(found: Cells, known: Mapping[str, OutcomeModel]) -> dict[tuple[str, str], Array]:
-    """Return the error curves of every explorer in every world whose true outcomes are known, (seeds, times, columns)."""
+    """Return the L1 errors of the models learned in each run, (seeds, times, columns), by world and explorer.
+
+    `known`: the true outcomes by world; other worlds are left out.  The times and columns are those of `error_curve`.
+    """
     return {
         (world, explorer): np.array([error_curve(world, known[world], one["seen"]) for one in results])
         for (world, explorer), results in grouped_by(found, "world", "explorer").items()
@@ -131,12 +144,16 @@ def errors(found: Cells, known: Mapping[str, OutcomeModel]) -> dict[tuple[str, s
 
 
 def times(world: str) -> list[int]:
-    """Return the transitions after which the error of a world's models is measured."""
+    """Return the numbers of transitions after which the error of the models of a world is measured."""
     return [round(share * WORLDS[world].transitions) for share in SHARES]
 
 
 def error_curve(world: str, truth: OutcomeModel, seen: Ints) -> Array:
-    """Learn again from transitions (T, 3); returns the errors, shape (times, columns), NaN beyond the last transition."""
+    """Learn a model again from recorded transitions, and return its L1 errors at the times of `times`, (times, columns).
+
+    `seen`: (T, 3), state, action, state reached.  Columns: with imagined outcomes, over all and over stochastic actions; then without
+    imagined outcomes.  NaN at times beyond the last transition, and in the columns of stochastic actions if there are none.
+    """
     model, at = TransitionModel(space_of(world)), times(world)
     beliefs = (model, model.debiased())
     curve = np.full((len(at), len(COLUMNS)), np.nan)
@@ -148,7 +165,7 @@ def error_curve(world: str, truth: OutcomeModel, seen: Ints) -> Array:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return a row for each world and explorer at the last time, and the claims."""
+    """Return the results: "runs" has a row for each world and explorer after all transitions, "claims" the judged claims."""
     known = truths(found)
     last = {key: curves[:, -1] for key, curves in errors(found, known).items()}
     floors = {world: truth_error(truth) for world, truth in known.items()}
@@ -160,7 +177,11 @@ def findings(found: Cells) -> dict[str, Any]:
 
 
 def truth_error(truth: OutcomeModel) -> float | None:
-    """Return the error of the true outcomes' estimate on stochastic actions: 0 for a table; None if no action is stochastic."""
+    """Return the expected L1 error of the measured true outcomes, as a mean over the stochastic actions.
+
+    Returns 0 if a table defines the outcomes, None if no action is stochastic.  A stochastic action has no outcome with a probability of
+    0.9 or more.
+    """
     stochastic = most_likely(truth) < CERTAIN
     if not stochastic.any():
         return None
@@ -238,7 +259,10 @@ CLAIMS = (
 
 
 def plot(found: Cells) -> Any:
-    """Draw errors over transitions, one column per world: above all actions (dashed with imagined outcomes), below stochastic ones."""
+    """Draw the L1 errors of the models over the transitions, a column for each world.
+
+    Upper panels: all actions, dashed with imagined outcomes.  Lower panels: stochastic actions.  Returns a matplotlib figure.
+    """
     curves = errors(found, truths(found))
     worlds = [world for world in WORLDS if any(key[0] == world for key in curves)]
     drawing = new_figure(4.6 * len(worlds), 6.4)

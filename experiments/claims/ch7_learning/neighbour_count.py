@@ -44,13 +44,21 @@ Groups = Mapping[int | str, list[Run]]  # by graph
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return one condition per graph; the short version learns less."""
+    """Return the settings of the runs: one for each graph, with 4 to 32 or with equidistant neighbours per state.
+
+    With --quick the agents learn for 1000 instead of 4000 transitions.
+    """
     budgets = list(BUDGETS[:3] if arguments.quick else BUDGETS)
     return [Condition(f"k{graph}-n{budgets[-1]}", {"graph": graph, "budgets": budgets, "tasks": TASKS}) for graph in GRAPHS]
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Learn, and try the tasks after each budget of transitions; returns `reached` and `actions` (budgets, tasks)."""
+    """Learn on one graph, and try the tasks with the learned model after each number of transitions in `budgets`.
+
+    Returns for each task whether it was solved, `reached` (budgets, tasks), by how many `actions` (budgets, tasks), and the `fewest`
+    actions that the graph allows (tasks,); `covered`, the transitions until every action was tried (None: one was not); and
+    `state_actions`, the number of actions of the graph.
+    """
     space, plant = arm_space(neighbours=settings["graph"], tie_seed=seed), arm_plant(seed)
     begin_anywhere(space, plant, seed)
     agent = CuriousAgent(space, plant, seed=seed)
@@ -76,13 +84,13 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def drawn_tasks(space: Space, count: int, seed: int) -> list[tuple[int, int]]:
-    """Return random pairs of different states, start and goal."""
+    """Draw `count` random tasks: pairs of a start state and a goal state, which differ."""
     rng = np.random.default_rng(seed)
     return [(int(a), int(b)) for a, b in (rng.choice(len(space), 2, replace=False) for _ in range(count))]
 
 
 def fewest_actions(space: Space, start: int, goal: int) -> int:
-    """Return the number of actions from one state to another if each succeeds; 0 if no actions lead there, as in a few small graphs."""
+    """Return the smallest number of actions from one state to another if all actions succeed; 0 if there is no path."""
     reached, count = {start}, 0
     while goal not in reached:
         further = {int(to) for state in reached for to in space.actions(state)} | reached
@@ -93,16 +101,17 @@ def fewest_actions(space: Space, start: int, goal: int) -> int:
 
 
 class Attempt(NamedTuple):
-    """Whether the goal was reached, and the number of actions."""
+    """The result of one task: whether the goal state was reached, and by how many actions."""
 
     reached: bool
     actions: int
 
 
 def attempt(model: TransitionModel, plant: OfflinePlant, start: int, goal: int, most: int) -> Attempt:
-    """Go to `start` directly, then follow the plan to `goal` with at most `most` actions; the model does not change.
+    """Move the arm to the state `start`, and follow the model's plan to the state `goal` by at most `most` actions.
 
-    The plan maximises the discounted probability of coming into the goal state, by the debiased counts.
+    The plan maximises the discounted probability of entering the goal state, according to the counts without imagined outcomes.  The model
+    learns nothing.
     """
     space = model.space
     beliefs = model.debiased()
@@ -120,7 +129,7 @@ def attempt(model: TransitionModel, plant: OfflinePlant, start: int, goal: int, 
 
 
 def groups(found: Cells) -> Groups:
-    """Return the finished runs of each graph, sorted by seed; the graphs are in the order of GRAPHS."""
+    """Group the finished runs by graph (number of neighbours per state, or "equidistant"); each group is sorted by seed."""
 
     def of(result: CellResult) -> Run:
         return {**result.values, "budgets": result.cell.settings["budgets"]}
@@ -130,28 +139,31 @@ def groups(found: Cells) -> Groups:
 
 
 def success(run: Run, budget: int) -> float:
-    """Return the share of the tasks that were solved after a budget of transitions."""
+    """Return the share of tasks that a run solved after it had learned for `budget` transitions."""
     return float(np.mean(run["reached"][run["budgets"].index(budget)]))
 
 
 def direct(run: Run, budget: int) -> float:
-    """Return the share of the tasks that were solved with the fewest actions that the graph allows."""
+    """Return the share of tasks that a run solved by the fewest actions that its graph allows, after `budget` transitions."""
     place = run["budgets"].index(budget)
     return float(np.mean(run["reached"][place] & (run["actions"][place] <= run["fewest"])))
 
 
 def length(run: Run) -> float:
-    """Return the mean number of actions of the solved tasks, after the last budget."""
+    """Return the mean number of actions in the tasks that a run solved after its last transition."""
     return float(run["actions"][-1][run["reached"][-1]].mean())
 
 
 def learning_times(runs: list[Run]) -> list[int]:
-    """Return the transitions until every state-action was tried once, of the runs in which all were tried."""
+    """Return the number of transitions until every action was tried once, for the runs in which every action was tried."""
     return [run["covered"] for run in runs if run["covered"] is not None]
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return a row for each graph, and the claims if all graphs were run."""
+    """Return the results: "runs" has a row for each graph, "claims" the judged claims.
+
+    If not all graphs were run, the claims have no numbers.
+    """
     grouped = groups(found)
     rows = {f"{graph} neighbours": _row(runs) for graph, runs in grouped.items()}
     return {"runs": rows, "claims": judged(CLAIMS, grouped, set(GRAPHS) <= set(grouped))}
@@ -174,7 +186,10 @@ def _fewer(grouped: Groups) -> dict[int, list[Run]]:
 
 @claim("paper 4.1", "fewer neighbours shorten learning: transitions until every action was tried once", "qualitative")
 def sooner(grouped: Groups) -> Measured:
-    """Compare learning times; the claim is open if a run did not try every action, because the runs that finished are the faster ones."""
+    """Compare the learning times of the published graph and of sparser graphs.
+
+    The claim is open if a run did not try every action, because the runs that did are the faster ones.
+    """
     times = {graph: learning_times(runs) for graph, runs in _fewer(grouped).items()}
     middle = {graph: interquartile_mean(found) for graph, found in times.items() if found}
     text = ", ".join(f"{graph} neighbours: {time:.0f}" for graph, time in middle.items())
@@ -190,7 +205,10 @@ def sooner(grouped: Groups) -> Measured:
     "an impression",
 )
 def denser(grouped: Groups) -> Measured:
-    """Judge whether one of the sparser graphs is as good; each comparison counts (Bonferroni)."""
+    """Judge whether plans in one of the graphs with fewer than 16 neighbours succeed as often, and as directly, as with 16.
+
+    The intervals are widened for the number of comparisons (Bonferroni).
+    """
     fewer = _fewer(grouped)
     shares, straight = (of_each(fewer, partial(share, budget=JUDGED)) for share in (success, direct))
     level = level_of_each(len(fewer) - 1)
@@ -214,7 +232,10 @@ CLAIMS = (sooner, denser, longer)
 
 
 def plot(found: Cells) -> Any:
-    """Draw success, length of the paths and learning time over the number of neighbours."""
+    """Draw success of the tasks, number of actions and learning time over the number of neighbours.
+
+    Returns a matplotlib figure.
+    """
     grouped = groups(found)
     budgets = next(iter(grouped.values()))[0]["budgets"]
     drawing = new_figure(13.0, 4.0)

@@ -31,7 +31,10 @@ ALONG = np.linspace(0.0, 1.0, 41)  # shares of the straight path between two sam
 
 
 class TablePlant(WrappedPlant[OfflinePlant]):
-    """A Plant of the arm with the table; `moves`: the table is moved up or down at random after every PERIOD actions."""
+    """An offline plant of the left arm with a table whose top can be moved up and down.
+
+    `moves`: before every tenth action, the top is set at random to the lower or the upper height.
+    """
 
     def __init__(self, seed: int, moves: bool = False) -> None:
         self.world = World()
@@ -40,11 +43,11 @@ class TablePlant(WrappedPlant[OfflinePlant]):
         self._moves, self._rng, self._actions = moves, np.random.default_rng([seed, 741]), 0
 
     def set_top(self, height: float) -> None:
-        """Move the table's top to a height [m]."""
+        """Move the top of the table to this height [m] in the root frame."""
         self.world.move("table", position=_middle(height))
 
     def act(self, part: str, target: Array) -> Outcome:
-        """See Plant."""
+        """Perform an action as `mobee.plant.Plant.act` does; a table that moves is moved before every tenth action."""
         if self._moves and self._actions % PERIOD == 0:
             self.set_top(self._rng.choice((DOWN, UP)))
         self._actions += 1
@@ -56,7 +59,10 @@ def _middle(top: float) -> tuple[float, float, float]:
 
 
 class FrozenModel:
-    """A Rival that replans with a transition model after each action, and does not learn."""
+    """A planner that plans again with a fixed transition model after each action, and does not learn.
+
+    It implements the protocol experiments.kit.learning.arm_planners.Rival.
+    """
 
     repairs = 0
 
@@ -64,21 +70,25 @@ class FrozenModel:
         self._space, self._beliefs = space, beliefs
 
     def begin(self, goal: int) -> None:
-        """See Rival."""
+        """Plan to the goal state; as in `experiments.kit.learning.arm_planners.Rival.begin`."""
         self.planner = Planner(self._space, self._beliefs, [goal])
 
     def aim(self, q: Array) -> Array | None:
-        """See Rival."""
+        """Return the sample (4,) rad to go to from the pose `q` (4,) rad; as in `experiments.kit.learning.arm_planners.Rival.aim`."""
         state = self._space.state_of(q)
         sample: Array = self._space.samples[self._space.goal(state, int(self.planner.policy[state]))]
         return sample
 
     def observe(self, start: Array, end: Array) -> None:
-        """See Rival."""
+        """Do nothing, because the model learns nothing from a motion; as in `experiments.kit.learning.arm_planners.Rival.observe`."""
 
 
 def roadmaps(plant: TablePlant, space: Lattice) -> dict[str, Rival]:
-    """Return the lattice as a roadmap, verified with the table down: planned once, or repaired for one query or permanently."""
+    """Return three planners that use the lattice as a roadmap, by name, verified with the table at its lower height.
+
+    "planned once" never replans.  "repairs" changes the roadmap where a motion failed, for the present query; "remembers" for all later
+    queries too.
+    """
     plant.set_top(DOWN)
     belief = Belief(plant.inner.model, np.zeros(len(space.joints)), arm_clauses())
     roadmap = make_roadmap("lattice", belief, space, plant.inner.motors.seed)
@@ -89,7 +99,10 @@ def roadmaps(plant: TablePlant, space: Lattice) -> dict[str, Rival]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Queries:
-    """The queries of a seed: pairs of states, start and goal; `blocked` (S,): the states whose samples touch the raised table."""
+    """The queries of a seed: `pairs` of a start state and a goal state of the lattice `space`.
+
+    `blocked` (S,): the states in which a field of the arm overlaps the raised table.
+    """
 
     space: Lattice
     pairs: list[tuple[int, int]]
@@ -98,18 +111,25 @@ class Queries:
 
     @classmethod
     def of_seed(cls, plant: TablePlant, space: Lattice, count: int, seed: int) -> Queries:
-        """Draw queries; leaves the table down."""
+        """Draw `count` queries on a lattice; afterwards the table is at its lower height."""
         blocked = touched_states(plant, space, UP) & ~touched_states(plant, space, DOWN)
         return cls(space, drawn_pairs(plant, space, count, seed), blocked, seed)
 
     def of_model(self, beliefs: OutcomeModel, test: str) -> dict[str, float]:
-        """Return the measures of plans made with a transition model, in one of the TESTS."""
+        """Follow plans made with a transition model through all queries, and return the measures by name.
+
+        `beliefs`: outcomes and probabilities of the actions.  `test`: position of the table, "down", "up" or "moving" (drawn for every
+        query).  The measures are the numbers of `Followed`, "promised" and "kept" of `promises`, and "through" of `through`.
+        """
         followed = self._followed(FrozenModel(self.space, beliefs), test)
         promised, kept = promises(self.space, beliefs, self.pairs, followed.paths)
         return followed.numbers() | {"promised": promised, "kept": kept, "through": through(followed.paths, self.blocked)}
 
     def in_all_worlds(self, rival: Rival) -> dict[str, dict[str, float]]:
-        """Return the measures of a rival in each of the TESTS."""
+        """Let a planner answer all queries with each position of the table; returns the numbers of `Followed`.
+
+        The keys are the position, "down", "moving" (drawn for every query) or "up", and the name of the number.
+        """
         return {test: self._followed(rival, test).numbers() for test in TESTS}
 
     def _followed(self, rival: Rival, test: str) -> Followed:
@@ -119,13 +139,19 @@ class Queries:
 
 
 def touched_states(plant: TablePlant, space: Lattice, top: float) -> NDArray[np.bool_]:
-    """Return which states' samples (S,) are not clear of contacts and cables with the table's top at a height [m]."""
+    """Return which states (S,) have a sample that is in contact, or too near to a cable constraint, with the table at a height.
+
+    `top`: height of the table's top [m].  The table stays there.
+    """
     plant.set_top(top)
     return ~clear(plant.inner.model, space.samples, arm_clauses())
 
 
 def drawn_pairs(plant: TablePlant, space: Lattice, count: int, seed: int) -> list[tuple[int, int]]:
-    """Draw pairs of states whose straight path is blocked by the raised table and by nothing else; the table is in neither state."""
+    """Draw up to `count` pairs of states whose straight path in joint space is blocked by the raised table, and by nothing else.
+
+    In neither of the two states the arm touches the raised table.  Afterwards the table is at its lower height.
+    """
     free = np.flatnonzero(~touched_states(plant, space, UP))
     every = list(permutations(free.tolist(), 2))
     rng = np.random.default_rng([seed, 742])
@@ -144,25 +170,31 @@ def drawn_pairs(plant: TablePlant, space: Lattice, count: int, seed: int) -> lis
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Followed:
-    """How well plans or paths lead to their goals: means over the queries."""
+    """How well a planner led the arm through the queries; all numbers are means over the queries.
+
+    `paths`: the states of each query, from start to end.
+    """
 
     success: float
-    """Share of queries that reached their goal within MAX_ACTIONS actions."""
+    """Share of queries that reached their goal state within 20 actions."""
     actions: float
-    """Actions per query, MAX_ACTIONS for queries that failed."""
+    """Actions per query; a query that failed counts as 20."""
     touched: float
-    """Share of actions that ended in the table's field."""
+    """Share of actions that ended in contact with the table (fields included)."""
     met: float
-    """Share of queries with at least one such action: a query that is stuck at the table counts once."""
+    """Share of queries with at least one action that ended in contact with the table (fields included)."""
     paths: Paths
 
     def numbers(self) -> dict[str, float]:
-        """Return all fields but the paths, by name."""
+        """Return the fields `success`, `actions`, `touched` and `met` by name."""
         return {"success": self.success, "actions": self.actions, "touched": self.touched, "met": self.met}
 
 
 def follow(space: Lattice, rival: Rival, pairs: Sequence[tuple[int, int]], tops: Sequence[float], seed: int) -> Followed:
-    """Send a rival from rest at one state's sample to another state, for each query with the table's top at the given height [m]."""
+    """Let a planner send the arm from the sample of a start state to a goal state, in each of the queries.
+
+    `pairs`: start state and goal state of each query.  `tops`: height of the table's top in each query [m].  The arm begins at rest.
+    """
     plant = TablePlant(seed + 900)
     touched = met = 0
     paths: list[tuple[int, ...]] = []
@@ -189,9 +221,10 @@ def follow(space: Lattice, rival: Rival, pairs: Sequence[tuple[int, int]], tops:
 
 
 def promises(space: Lattice, beliefs: OutcomeModel, pairs: Sequence[tuple[int, int]], paths: Paths) -> tuple[float, float]:
-    """Return two numbers of the paths: the predicted probability that a plan is followed exactly, and the share that was followed so.
+    """Return how much of the plans was predicted and fulfilled: two numbers from 0 to 1, means over the queries.
 
-    Both are 0 if no plan was found.
+    The first is the predicted probability that all actions of a plan end as planned.  The second is the share of queries whose states, in
+    `paths`, were exactly those of the plan.  `beliefs`: transition model of the plans.  A query without a plan counts as 0 in both.
     """
     plans = [_plan(space, beliefs, start, goal) for start, goal in pairs]
     kept = [plan is not None and plan.path == path for plan, path in zip(plans, paths, strict=True)]
@@ -207,6 +240,9 @@ def _plan(space: Lattice, beliefs: OutcomeModel, start: int, goal: int) -> Plan 
 
 
 def through(paths: Paths, blocked: NDArray[np.bool_]) -> float:
-    """Return the share of the states on the paths, without start and end, that the raised table blocks."""
+    """Return the share of states on the paths, without start and end, in which the arm would touch the raised table.
+
+    `paths`: states of each query.  `blocked`: (S,), the states of `Queries.blocked`.  0 if there are no states between start and end.
+    """
     passed = [bool(blocked[state]) for path in paths for state in path[1:-1]]
     return float(np.mean(passed)) if passed else 0.0

@@ -46,7 +46,11 @@ MIN_DEFLECTED, MIN_FAILING = 0.9, 0.5  # shares of tries
 
 @dataclass(frozen=True)
 class Variant:
-    """A plant of one arm; `gains` and `settle` change the published gains, `motors` the default motors."""
+    """A plant of the left arm that differs from the published one in some parameters.
+
+    `gains`, `settle`, `motors`: changed fields of the gains, of their settle test and of the motor parameters, by name.  `dt`: control
+    period [s].  `gain_set`, `motor_set`, `robot`: functions that return the gains, the motor parameters and the robot before these changes.
+    """
 
     gains: dict[str, Any] = field(default_factory=dict)
     settle: dict[str, float] = field(default_factory=dict)
@@ -57,7 +61,7 @@ class Variant:
     robot: Callable[[], Robot] = robot
 
     def plant(self, seed: int) -> OfflinePlant:
-        """Return a plant of the left arm's four motors."""
+        """Return an offline plant in which the four motors of the left arm move."""
         gains = self.gain_set()
         gains = replace(gains, **self.gains, settle=replace(gains.settle, **self.settle))
         motors = replace(self.motor_set(), **self.motors)
@@ -65,7 +69,7 @@ class Variant:
 
 
 def normalised() -> Robot:
-    """Return the published robot with normalised cable constraints, so that distances from them are angles in rad."""
+    """Return the published robot with cable constraints scaled to unit normals, so that a.q + b is a distance in rad."""
     clauses = []
     for clause in robot().clauses:
         length = np.linalg.norm(clause.a, axis=1)
@@ -119,13 +123,20 @@ VARIANTS: dict[str, Variant] = {
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return one condition per variant; the short version makes a tenth of the transitions."""
+    """Return the settings of the runs: one for each variant of the plant.
+
+    With --quick the runs have a tenth of the transitions.
+    """
     share, name = (QUICK, "quick-") if arguments.quick else (1.0, "")
     return [Condition(f"{name}{number:02d}", {"variant": variant, "share": share}) for number, variant in enumerate(VARIANTS)]
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Explore both lattices; returns the transitions (T, 3) of each, the share of timeouts and the mean duration of an action [s]."""
+    """Explore both lattices with the plant of one variant.
+
+    Returns the transitions (T, 3) on each lattice, `rank4` and `rank3`; `timeouts`, the share of actions that timed out; and `seconds`, the
+    mean plant time of an action [s].
+    """
     values: dict[str, Any] = {}
     settled, durations = [], []
     for lattice, levels in LEVELS.items():
@@ -143,13 +154,20 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def summary(values: dict[str, Any]) -> dict[str, Any]:
-    """Sort the transitions, whose order is not needed."""
+    """Reduce the values of `trial` for the raw record: the transitions are sorted, because only their counts are needed."""
     return values | {lattice: in_order(values[lattice]) for lattice in LEVELS}
 
 
 @dataclass(frozen=True)
 class Row:
-    """The mean numbers of a variant's runs."""
+    """The results of one variant, as means over its runs.
+
+    On rank 4: `never`, how many of the states 60, 124, 188 and 252 were never reached; `hardly`, visits of each of 61, 125, 189 and 253;
+    `others`, number of other states never reached; `deflected`, share of the tries of 57->61, 121->125 and 249->253 that ended one pitch
+    level higher; `where`, state in which 57->61 ended most often; `uncertain`, number of actions with several outcomes.  On rank 3:
+    `failing`, share of the tries of 15->24, 42->51 and 69->78 that failed; `entering`, the same of 21->24.  On both: `timeouts`, share of
+    actions that timed out; `seconds`, plant time per action.
+    """
 
     never: float  # how many of the four states were never reached
     hardly: float  # visits of each of the other four
@@ -164,22 +182,22 @@ class Row:
 
     @property
     def rank4(self) -> bool:
-        """Whether the findings of rank 4 are reproduced."""
+        """Whether the published findings on the lattice of rank 4 (256 states) are reproduced."""
         rare, deflected = self.hardly <= MAX_RARE_VISITS, self.deflected >= MIN_DEFLECTED
         return self.never == len(NEVER) and rare and self.others == 0 and deflected
 
     @property
     def rank3(self) -> bool:
-        """Whether the findings of rank 3 are reproduced."""
+        """Whether the published findings on the lattice of rank 3 (81 states) are reproduced."""
         return self.failing >= MIN_FAILING and self.entering <= 1.0 - MIN_DEFLECTED
 
     @property
     def both(self) -> bool:
-        """Whether the findings of both lattices are reproduced."""
+        """Whether the published findings on both lattices are reproduced."""
         return self.rank4 and self.rank3
 
     def record(self) -> dict[str, Any]:
-        """Return a row of the results; None for NaN, which JSON does not have."""
+        """Return the row as JSON values by label, with the verdicts "reproduced" or "lost"; NaN becomes None."""
         labels = {"findings on 256 states": self.rank4, "findings on 81 states": self.rank3}
         verdicts = {label: "reproduced" if is_there else "lost" for label, is_there in labels.items()}
         values = dict(zip(COLUMNS, asdict(self).values(), strict=True))
@@ -201,7 +219,7 @@ COLUMNS = (  # labels of the fields of a Row
 
 
 def rows_of(found: Cells) -> dict[str, Row]:
-    """Return the row of every variant with a finished run, in the order of the variants."""
+    """Return the row of each variant of the plant that has finished runs, by its name."""
     return {variant: _row(runs) for variant, runs in grouped(found, "variant", (*VARIANTS,)).items()}
 
 
@@ -238,7 +256,10 @@ def _share(space: Lattice, runs: Sequence[Ints], ends: Mapping[tuple[int, int], 
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return a row for each variant, and the claims with numbers if all were run in full."""
+    """Return the results: "variants" has a row for each variant, "claims" the judged claims.
+
+    If not all variants were run in full, the claims have no numbers.
+    """
     rows = rows_of(found)
     whole = set(rows) == set(VARIANTS) and all(len(result.values["rank4"]) == ACTIONS["rank4"] for result in found.values())
     return {
@@ -251,7 +272,7 @@ EachRun = Mapping[str, list[Row]]  # the row of every run, by variant
 
 
 def each_run(found: Cells) -> EachRun:
-    """Return the row of every run by itself."""
+    """Return one `Row` for each finished run, by variant."""
     return {variant: [_row([run]) for run in runs] for variant, runs in grouped(found, "variant", (*VARIANTS,)).items()}
 
 
@@ -329,7 +350,10 @@ HEADER = (
 
 
 def plot(found: Cells) -> Any:
-    """Draw the table of variants: numbers as published in green, others in red."""
+    """Draw the rows of all variants as a table: numbers that reproduce the published findings are green, others red.
+
+    Returns a matplotlib figure.
+    """
     rows = rows_of(found)
     drawing = new_figure(13.0, 0.8 + 0.23 * len(rows))
     axes = drawing.subplots()

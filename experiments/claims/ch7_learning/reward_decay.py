@@ -35,13 +35,19 @@ Groups = Mapping[str, list[dict[str, Any]]]
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return one condition per explorer; the short version leaves out the last two times."""
+    """Return the settings of the runs: one for each explorer.
+
+    With --quick the runs have 1000 instead of 4000 transitions.
+    """
     times = list(QUICK_TIMES if arguments.quick else TIMES)
     return [Condition(explorer, {"explorer": explorer, "times": times}) for explorer in EXPLORERS]
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Explore; returns the rewards (times, state-actions) after given numbers of transitions."""
+    """Explore with one explorer, and record the expected reward [nats] of every action after each number of transitions in `times`.
+
+    Returns `rewards` (times, actions) and `times`.
+    """
     space, plant = arm_space(neighbours=ARM_NEIGHBOURS), arm_plant(seed)
     begin_anywhere(space, plant, seed)
     agent = CuriousAgent(space, plant, settings["explorer"], seed)
@@ -87,7 +93,10 @@ CLAIMS = (uniform, collected, faster)
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return a row for each explorer, and the claims."""
+    """Return the results: "runs" has two rows for each explorer (mean and largest reward), "claims" the judged claims.
+
+    If not every explorer was run, the claims have no numbers.
+    """
     groups = grouped(found, "explorer", EXPLORERS)
     rows: dict[str, Any] = {}
     for explorer, runs in groups.items():
@@ -101,7 +110,10 @@ def findings(found: Cells) -> dict[str, Any]:
 
 
 def plot(found: Cells) -> Any:
-    """Draw the rewards of one run of each explorer (fig. 6): one row per time, with one scale per row."""
+    """Draw the rewards of all actions in one run of each explorer (fig. 6): a row of panels for each time, with one scale per row.
+
+    Returns a matplotlib figure.
+    """
     groups = grouped(found, "explorer", EXPLORERS)
     times = next(iter(groups.values()))[0]["times"]
     drawing = new_figure(5.0 * len(groups), 1.7 * len(times))

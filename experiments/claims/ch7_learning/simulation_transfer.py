@@ -44,7 +44,7 @@ TRANSITIONS, MIN_TRIES = 800, 2  # per part; of a state-action that is compared
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options of a sweep, --transitions, --least, --table and --only-table."""
+    """Add the options of a sweep, and --transitions, --least, --table and --only-table."""
     sweep_arguments(parser, seeds=5)
     parser.add_argument("--transitions", type=positive_whole, default=TRANSITIONS, metavar="N", help=f"per part (default: {TRANSITIONS})")
     text = f"tries from which a state-action is compared (default: {MIN_TRIES})"
@@ -55,14 +55,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def cells(arguments: argparse.Namespace) -> list[Cell]:
-    """Return the offline seeds of each task."""
+    """Return the cells that learn on the offline plant: one for each task ("arms", "table") and seed, at least two seeds."""
     number = _transitions(arguments)
     seeds = range(arguments.seed, arguments.seed + max(2, arguments.seeds))
     return [Cell(f"{task}-s{seed}", seed, {"task": task, "transitions": number}) for task in _tasks(arguments) for seed in seeds]
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Learn offline and live, and compare."""
+    """Learn on the offline plant and on each simulated robot, and return the results of the comparison.
+
+    Finished cells and transitions in the folder are not repeated.
+    """
     run_cells(learn_offline, cells(arguments), folder, arguments)
     number = _transitions(arguments)
     with Progress() as progress:
@@ -77,14 +80,20 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 def results(folder: Path) -> dict[str, Any]:
-    """Compute the distances and the claim from the transitions in the folder."""
+    """Compute the results from the transitions in the folder: the distances between the models, and the judged claim.
+
+    With runs at the table, also how the actions of each part ended there.
+    """
     tasks = _compared(folder)
     table = {f"{task}, {robot}": row for task, found in tasks.items() for robot, row in _rows(found).items()}
     return {"claims": judged((equal,), tasks), "distances": table} | _at_the_table(folder)
 
 
 def figure(folder: Path) -> Path:
-    """Draw distances from the offline seeds, and how often actions reach their goals."""
+    """Draw the distances of the live robots and the offline seeds, and how often actions reach their goals.
+
+    Returns the path of the picture in the folder.
+    """
     return saved(draw_distances(_compared(folder), _least(folder)), folder, 130)
 
 
@@ -151,7 +160,10 @@ def _as_near(value: float, offline: Sequence[float]) -> bool | None:
 
 
 def prediction_bound(values: Sequence[float]) -> float:
-    """Return the bound below which one more value lies with 95 % probability, if the values are normally distributed."""
+    """Return the bound below which one more value lies with a probability of 95 %, if all are normally distributed.
+
+    `values`: at least two earlier values.
+    """
     n = len(values)
     return float(np.mean(values) + stdtrit(n - 1, 0.95) * np.std(values, ddof=1) * np.sqrt(1.0 + 1.0 / n))
 

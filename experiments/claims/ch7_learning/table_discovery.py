@@ -62,12 +62,16 @@ DAYS, TOLERANCE = (2.0, 2.4), 0.1  # of plant time: "a little more than two", an
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add --part."""
+    """Add the option --part: also run with contact forces that act only up to the root of a part."""
     parser.add_argument("--part", action="store_true", help="also with contact forces that act only up to the root of a part")
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return every explorer at the table and at its ghost."""
+    """Return the settings of the runs: every explorer at the table and at its ghost, which exerts no force.
+
+    With --part the same runs are made again with contact forces that act only up to the root of a part.  With --quick the runs have 2000
+    instead of 18 000 transitions per part.
+    """
     transitions, name = (QUICK, "quick-") if arguments.quick else (TRANSITIONS, "")
     return [
         Condition(
@@ -80,10 +84,11 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Explore.
+    """Let the three agents explore with one explorer, at the table or at its ghost, until each has made its transitions.
 
-    Returns the transitions of each part and their durations; and for each action of an arm whether it ended at the table, and whether the
-    torso was bent then.
+    Returns for each part `seen_PART` (T, 3), the transitions: state, action, state reached; `settled_PART` (T,), False after a timeout;
+    `durations_PART` (T,) [s]; and `ends_PART` (T,) [s], the plant time at the end.  For each arm also `touch_ARM` (T,), whether an action
+    ended within 2 cm of the table or ghost, and `forward_ARM` (T,), whether the torso was bent forward then.
     """
     count = settings["transitions"]
     plant = table_plant(seed, settings["world"] == "ghost", settings["propagate"])
@@ -101,7 +106,10 @@ Number = Callable[[Run], float]
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return a row for each condition, tries compared with the ghost, the detector; and the claims, with numbers after a full run."""
+    """Return the results: rows for each explorer at table and ghost, their comparison, numbers of outcomes, detectors, claims.
+
+    If not every explorer was run in full at both, the claims have no numbers.
+    """
     forces = runs_of(found)
     tree = forces.get(PROPAGATIONS[0], {})
     whole = {(explorer, world) for explorer in EXPLORERS for world in WORLDS} <= set(tree)
@@ -160,7 +168,11 @@ def _histogram(runs: Sequence[Run]) -> dict[str, float]:
 
 
 def detector(runs: Runs) -> dict[str, dict[str, float]]:
-    """Return the precision (equal to the recall) of a detector that names as many actions as are dependent, and the precision of chance."""
+    """Return how well a high number of tries indicates that an action depends on other parts, by "learner, explorer".
+
+    Each value has the precisions of two detectors, "tries" and "beside_ghost" (tries over those at the ghost).  A detector names as many
+    actions as really depend on other parts, so that its precision and recall are equal.  "chance" is the precision of a random choice.
+    """
     table: dict[str, dict[str, float]] = {}
     for learner, explorer in product(LEARNERS, EXPLORERS):
         found = {score: judged_of(runs, explorer, learner, score) for score in measures.SCORES}
@@ -323,9 +335,9 @@ STYLES = {"table": "-", "ghost": ":"}
 
 
 def plot(found: Cells) -> Any:
-    """Draw tries of the three learners as in paper fig. 10; contact, agreement of the arms, cycles, outcomes and the detector.
+    """Draw the tries of the three learners as in paper fig. 10; contact, agreement of the arms, cycles, outcomes and the detector.
 
-    Raises InvalidValue unless there are runs of the curious agents both at the table and at the ghost.
+    Returns a matplotlib figure.  Raises InvalidValue if no seed has runs of the curious agents both at the table and at the ghost.
     """
     runs = runs_of(found).get(PROPAGATIONS[0], {})
     pairs = with_ghosts(runs, "curious")

@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Measures of runs at the table: contact of the arms with it, interest in it, cycles of contact, and actions that depend on other parts.
 
-Contact is computed from poses alone, in the same way for tables that exert forces and for ghosts.
+A ghost of the table is an object at the same place that exerts no force.  Contact is computed from poses alone, in the same manner for the
+table and its ghost.
 
 A graph of 16 neighbours has preferred actions of its own, so tries are compared with those of the same agent at a ghost of the table.
 
-Contact is cyclic if the autocorrelation of the contact rate has a second peak, at a period, and that of a ghost has none.  High values at
+Contact is cyclic if the autocorrelation of the contact rate has a second peak, at a period, and that at a ghost has none.  High values at
 the first lags only mean that contacts come in bouts.
 
 At a ghost no part disturbs another, except for hands that meet.  So an action that ends elsewhere at the table than at the ghost depends on
-the poses of the other parts (paper 4.4).  Which actions do is taken from the runs of other seeds than the judged one.
+the poses of the other parts (paper 4.4).  Which actions depend on them is computed from the runs of other seeds than the judged one.
 """
 
 from __future__ import annotations
@@ -51,19 +52,19 @@ LEARNERS = {"torso": ("torso",), "arms": ARMS}  # both arms have the same graph
 
 @cache
 def spaces() -> dict[str, Lattice]:
-    """Return the lattice of each part; both arms have the same graph."""
+    """Return the lattice of each part ("torso", "left_arm", "right_arm"); both arms have the same graph."""
     return {"torso": torso_space(), **{arm: arm_space(RANK3, ARM_NEIGHBOURS, joints=joints) for arm, joints in JOINTS.items()}}
 
 
 @cache
 def low() -> NDArray[np.bool_]:
-    """Return which of the arms' states (81,) lie below the table's top when the torso is bent, for one arm or the other."""
+    """Return which states (81,) put the left or the right arm below the table's top when the torso is bent forward."""
     either: NDArray[np.bool_] = low_goals(ARMS[0]) | low_goals(ARMS[1])
     return either
 
 
 def world_around(margin: float) -> World:
-    """Return a world with a table that is larger by a margin [m] on every side."""
+    """Return a world with the table alone, made larger by `margin` [m] on every side."""
     table = table_world().objects["table"]
     larger = World()
     size = [edge + 2.0 * margin for edge in table.size]
@@ -72,7 +73,10 @@ def world_around(margin: float) -> World:
 
 
 def near_table(q: Array, arm: str, margin: float = NEAR_DISTANCE) -> NDArray[np.bool_]:
-    """Return in which poses q (N, n) rad a field of the arm is nearer to the table than the margin [m], (N,)."""
+    """Return in which poses a field of the arm is nearer to the table than `margin` [m], (N,).
+
+    `q`: (N, n) rad, poses of the robot.  `arm`: "left_arm" or "right_arm".
+    """
     model, moved = Model(robot(), world_around(margin)), np.array(sorted(links_moved(robot())[arm]))
     near = np.zeros(len(q), dtype=bool)
     for first in range(0, len(q), BATCH):
@@ -83,7 +87,7 @@ def near_table(q: Array, arm: str, margin: float = NEAR_DISTANCE) -> NDArray[np.
 
 
 def low_goals(arm: str) -> NDArray[np.bool_]:
-    """Return which states (81,) of an arm lie below the table's top when the torso is bent forward (75 % of its range)."""
+    """Return which states (81,) put the arm below the table's top when the torso is bent forward (75 % of its pitch range)."""
     space, pitch = arm_space(joints=JOINTS[arm]), robot().motor_index(TORSO[2])
     q = np.tile(robot().home, (len(space), 1))
     low, high = robot().limits[pitch]
@@ -93,16 +97,18 @@ def low_goals(arm: str) -> NDArray[np.bool_]:
 
 
 def is_forward(q: Array) -> NDArray[np.bool_]:
-    """Return in which poses q (N, n) rad the torso is bent forward, (N,)."""
+    """Return in which poses `q` (N, n) rad of the robot the torso is bent forward by more than 30 degrees, (N,)."""
     bent: NDArray[np.bool_] = q[:, robot().motor_index(TORSO[2])] > FORWARD
     return bent
 
 
 def summary(values: dict[str, Any]) -> dict[str, Any]:
-    """Reduce the values of a trial to the numbers and counts from which the claims and the figure are computed.
+    """Reduce the values of a trial at the table to the numbers and counts from which claims and figure are computed.
 
-    Returns of each part: how often each action ended in each state, as indices in (S, A, S) and counts, its tries in the second half, and
-    the share of timeouts; of the arms the contact rate in windows, and in parts of the run; and hours of plant time.
+    Returns for each part, with its name at the end of the key, `ends_at` and `ends`: the non-zero entries of the counts (S, A, S) of how
+    often an action ended in a state, as flat indices and counts; `late_tries` (S, A), tries in the second half; and `timeouts`, the share
+    of actions that timed out.  For the arms together, `touch_rate`, the contact rate in windows of 50 transitions, and `touch`, `growth`
+    and `low_and_forward` as in `Run`.  `hours`: plant time; `transitions`: of each part.
     """
     seen = {part: values[f"seen_{part}"].astype(np.intp) for part in PARTS}
     touch, forward = (np.array([values[f"{name}_{arm}"] for arm in ARMS], dtype=bool) for name in ("touch", "forward"))
@@ -130,22 +136,22 @@ def summary(values: dict[str, Any]) -> dict[str, Any]:
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """One run of three agents, from its `summary`."""
+    """One run of the three agents of torso and arms; `result`: its cell, with the values of `summary`."""
 
     result: CellResult
 
     @property
     def seed(self) -> int:
-        """The seed of agents and encoders."""
+        """The seed of the agents and of the encoder noise."""
         return self.result.cell.seed
 
     def number(self, name: str) -> float:
-        """Return a number of the summary."""
+        """Return the number with this name in the values of `summary`."""
         return float(self.result.values[name])
 
     @cached_property
     def ends(self) -> dict[str, Ints]:
-        """How often each action of a part ended in each state, (S, A, S)."""
+        """How often each action ended in each state, (S, A, S), by part."""
         found = {part: np.zeros((*spaces()[part].goals.shape, len(spaces()[part])), dtype=np.int32) for part in PARTS}
         for part, counts in found.items():
             counts.ravel()[self.result.values[f"ends_at_{part}"]] = self.result.values[f"ends_{part}"]
@@ -153,56 +159,62 @@ class Run:
 
     @cached_property
     def tries(self) -> dict[str, Ints]:
-        """Tries of each part's actions, (S, A)."""
+        """The tries of each action, (S, A), by part."""
         return {part: ends.sum(axis=-1) for part, ends in self.ends.items()}
 
     @cached_property
     def late_tries(self) -> dict[str, Ints]:
-        """Tries of each part's actions in the second half, (S, A)."""
+        """The tries of each action in the second half of the run, (S, A), by part."""
         return {part: self.result.values[f"late_tries_{part}"].astype(np.intp) for part in PARTS}
 
     @cached_property
     def outcomes(self) -> dict[str, Ints]:
-        """The number of states in which each action of a part ended, (S, A)."""
+        """The number of different states in which each action ended, (S, A), by part."""
         return {part: (ends > 0).sum(axis=-1) for part, ends in self.ends.items()}
 
     @cached_property
     def outcome_numbers(self) -> Ints:
-        """The number of states in which each action ended, of all tried actions of all parts."""
+        """The number of different states in which an action ended, for every tried action of all parts, (E,)."""
         every = np.concatenate([self.outcomes[part].ravel() for part in PARTS])
         return every[every > 0]
 
     @property
     def touch(self) -> float:
-        """The share of the arms' actions that ended in contact with the table, in the second half."""
+        """The share of the arms' actions in the second half of the run that ended within 2 cm of the table (or ghost)."""
         return self.number("touch")
 
     @property
     def touch_rate(self) -> Array:
-        """The share of actions that ended in contact, in windows of WINDOW transitions of each arm."""
+        """The share of the arms' actions that ended within 2 cm of the table, in windows of 50 transitions of each arm, (windows,)."""
         rate: Array = self.result.values["touch_rate"]
         return rate
 
     @property
     def growth(self) -> float:
-        """The contact rate of the last third minus that of the first."""
+        """The contact rate in the last third of the run minus that in the first third."""
         return self.number("growth")
 
     @property
     def torso_forward(self) -> float:
-        """Mean tries of the torso's actions that lean forward over those of its other actions, in the second half."""
+        """How often the torso leans forward, in the second half: mean tries of these actions over those of its other actions."""
         tries, goals = self.late_tries["torso"], spaces()["torso"].goals
         forward = (goals >= FORWARD_STATES.start) & (goals < FORWARD_STATES.stop)
         return float(tries[forward].mean() / tries[~forward].mean())
 
     @property
     def low_and_forward(self) -> float:
-        """The share of the arms' actions with a low goal that ended while the torso was bent, in the second half."""
+        """The share of the arms' actions in the second half that had a low goal and ended while the torso was bent forward.
+
+        A goal is low if it is below the table's top when the torso is bent forward.
+        """
         return self.number("low_and_forward")
 
     @property
     def arms_low(self) -> float:
-        """Mean tries of the arms' actions with a low goal over those of the other actions, in the second half."""
+        """How often the arms aim low, in the second half: mean tries of actions with a low goal over those of their other actions.
+
+        A goal is low if it is below the table's top when the torso is bent forward.
+        """
         tries = np.sum([self.late_tries[arm] for arm in ARMS], axis=0)
         aims_low = low()[spaces()[ARMS[0]].goals]
         return float(tries[aims_low].mean() / tries[~aims_low].mean())
@@ -221,12 +233,12 @@ class Run:
 
     @property
     def timeouts(self) -> dict[str, float]:
-        """The share of a part's actions that timed out."""
+        """The share of actions that timed out, by part."""
         return {part: self.number(f"timeouts_{part}") for part in PARTS}
 
     @property
     def hours(self) -> float:
-        """Hours of plant time until the slowest agent was finished."""
+        """The plant time in hours until every agent had made its transitions."""
         return self.number("hours")
 
 
@@ -234,7 +246,10 @@ Runs = Mapping[tuple[str, str], list[Run]]  # by explorer and world
 
 
 def runs_of(found: Cells) -> dict[str, Runs]:
-    """Return the finished runs by propagation of the forces, of each condition by seed, in the order of the conditions."""
+    """Group the finished runs by propagation of contact forces ("tree" or "part"), then by (explorer, world).
+
+    Each group is sorted by seed; groups without a finished run are absent.
+    """
     grouped = runs_by(found, Run, "propagate", "explorer", "world")
     forces: dict[str, dict[tuple[str, str], list[Run]]] = {}
     for propagate, *key in product(PROPAGATIONS, EXPLORERS, WORLDS):
@@ -244,38 +259,41 @@ def runs_of(found: Cells) -> dict[str, Runs]:
 
 
 def with_ghosts(runs: Runs, explorer: str) -> list[tuple[Run, Run]]:
-    """Return each run at the table with the run of the same seed at the ghost."""
+    """Return pairs of runs of an explorer with the same seed: one at the table, and one at the ghost."""
     ghosts = {run.seed: run for run in runs.get((explorer, "ghost"), [])}
     return [(run, ghosts[run.seed]) for run in runs.get((explorer, "table"), []) if run.seed in ghosts]
 
 
 def log_ratios(run: Run, ghost: Run, part: str) -> Array:
-    """Return the logarithm of each action's tries at the table over those at the ghost, (S, A)."""
+    """Return the logarithm of (tries at the table + 1) / (tries at the ghost + 1) of each action of a part, (S, A)."""
     ratios: Array = np.log((run.tries[part] + 1.0) / (ghost.tries[part] + 1.0))
     return ratios
 
 
 def of_arms(run: Run, ghost: Run) -> Array:
-    """Return the log ratios of both arms, (2, S, A)."""
+    """Return the `log_ratios` of the actions of both arms, (2, S, A)."""
     return np.array([log_ratios(run, ghost, arm) for arm in ARMS])
 
 
 def by_goal(ratios: Array) -> Array:
-    """Return the ratios (2 arms, S, A) averaged over all actions with the same goal state: (2, S) by goal, 0 where no action leads."""
+    """Average the ratios (2 arms, S, A) over all actions with the same goal state; returns (2, S), indexed by the goal state.
+
+    The result is 0 for a state that is the goal of no action.
+    """
     goals = spaces()[ARMS[0]].goals
     count = np.bincount(goals.ravel(), minlength=len(goals))
     return np.array([np.bincount(goals.ravel(), weights=ratio.ravel(), minlength=len(goals)) / np.maximum(count, 1) for ratio in ratios])
 
 
 def agreement(pair: Array) -> float:
-    """Return the rank correlation of the two arms."""
+    """Return the rank correlation between the numbers of the left and of the right arm; `pair`: (2, ...)."""
     from scipy.stats import spearmanr  # a second
 
     return float(spearmanr(pair[0].ravel(), pair[1].ravel()).statistic)
 
 
 def autocorrelation(rate: Array, most: int) -> Array:
-    """Return the autocorrelation of a series without its linear trend, at the lags 0 to `most`, (most + 1,)."""
+    """Return the autocorrelation of a series at the lags 0 to `most`, (most + 1,), after its linear trend is removed."""
     steps = np.arange(len(rate))
     residuals = rate - np.polyval(np.polyfit(steps, rate, 1), steps)
     products = [float((residuals[lag:] * residuals[: len(residuals) - lag]).sum()) for lag in range(most + 1)]
@@ -283,18 +301,28 @@ def autocorrelation(rate: Array, most: int) -> Array:
 
 
 def share_of_top(ratios: Array, chosen: NDArray[np.bool_]) -> float:
-    """Return the share of chosen actions (S, A) among those with the highest ratios, mean of both arms."""
+    """Return the share of chosen actions among the 5 % of actions with the highest ratios, as a mean over both arms.
+
+    `ratios`: (2, S, A), of both arms.  `chosen`: (S, A).
+    """
     count = max(1, round(TOP_SHARE * ratios[0].size))
     return float(np.mean([chosen.ravel()[np.argsort(-ratio, axis=None)[:count]].mean() for ratio in ratios]))
 
 
 def correlations(runs: Sequence[Run]) -> Array:
-    """Return the autocorrelation of each run's contact rate up to the longest period, (runs, lags)."""
+    """Return the autocorrelation of the contact rate of each run, (runs, lags).
+
+    The largest lag is a third of the run, so that the run contains at least three periods.
+    """
     return np.array([autocorrelation(run.touch_rate, len(run.touch_rate) // PERIODS) for run in runs])
 
 
 def second_peak(curves: Array) -> int:
-    """Return the lag at which the mean of autocorrelations (runs, lags) is highest after it first fell below 0, or after BOUT."""
+    """Return the lag [windows] of the second peak of an autocorrelation: where the mean of `curves` (runs, lags) is largest.
+
+    Only lags of at least 3 windows count and, if the mean becomes negative there, only lags from this one on: nearer to 0 is the first
+    peak.
+    """
     mean = curves.mean(axis=0)
     fallen = np.flatnonzero(mean[BOUT + 1 :] < 0.0)
     first = BOUT + 1 + (int(fallen[0]) if len(fallen) else 0)
@@ -302,17 +330,20 @@ def second_peak(curves: Array) -> int:
 
 
 def at_second_peak(ours: Array, theirs: Array) -> tuple[list[float], list[float]]:
-    """Return the autocorrelation of each run, and of its ghost, at the second peak of the other runs; at least two runs."""
+    """Return the autocorrelation of each run, and of its ghost, at the lag that is the second peak of all other runs.
+
+    `ours`, `theirs`: (runs, lags), at the table and at the ghost; at least two runs.
+    """
     lags = [second_peak(np.delete(ours, run, axis=0)) for run in range(len(ours))]
     here, there = ([float(curve[lag]) for curve, lag in zip(curves, lags, strict=True)] for curves in (ours, theirs))
     return here, there
 
 
 def is_cyclic(ours: Array, theirs: Array) -> bool | None:
-    """Return whether there is a second peak, above 0 and above the ghosts' by the intervals over two or more runs.
+    """Return whether contact is cyclic: whether the autocorrelation has a second peak, above 0 and above that at the ghost.
 
-    False if, in addition, the highest values of the runs beyond the lag BOUT are not above those of the ghosts; None if they are, but
-    without a common peak.
+    `ours`, `theirs`: autocorrelations (runs, lags) at the table and at the ghost; at least two runs, whose intervals decide.  Without such
+    a peak: None if at lags beyond the bouts the largest values of single runs are above those at the ghost, else False.
     """
     here, there = at_second_peak(ours, theirs)
     if interval(here)[0] > max(0.0, interval(there)[1]):
@@ -329,38 +360,42 @@ SCORES: dict[str, Callable[[Run, Run, str], Array]] = {
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """Which of a learner's actions in one run depend on other parts, (parts, actions), those with the highest scores first.
+    """The actions of a learner in one run, sorted by a score, the highest first: which of them depend on other parts.
 
-    Its numbers are means over the parts, because the two arms of a run are not independent runs.
+    `hits`: (parts, actions).  The properties are means over the parts, because the two arms of a run are not independent runs.
     """
 
     hits: NDArray[np.bool_]
 
     @property
     def chance(self) -> float:
-        """The share of actions that depend on other parts."""
+        """The share of all actions that depend on other parts: the precision of a random choice."""
         return float(self.hits.mean())
 
     @property
     def at_all(self) -> float:
-        """The precision (equal to the recall) if as many actions are called dependent as really depend on other parts."""
+        """The precision, equal to the recall, if as many actions are called dependent as really depend on other parts."""
         return float(self.hits[:, : int(self.hits[0].sum())].mean())
 
     @property
     def precision(self) -> Array:
-        """The precision when the first k actions are called dependent, for every k."""
+        """The precision if the first k actions are called dependent, for k = 1 to all, (actions,)."""
         found: Array = (np.cumsum(self.hits, axis=1) / np.arange(1, self.hits.shape[1] + 1)).mean(axis=0)
         return found
 
     @property
     def recall(self) -> Array:
-        """The recall when the first k actions are called dependent, for every k."""
+        """The recall if the first k actions are called dependent, for k = 1 to all, (actions,)."""
         found: Array = (np.cumsum(self.hits, axis=1) / self.hits.sum(axis=1, keepdims=True)).mean(axis=0)
         return found
 
 
 def dependent(runs: Runs, parts: Sequence[str], but: int) -> NDArray[np.bool_]:
-    """Return which actions (S, A) of these parts end differently at the table than at the ghost, by the runs of all seeds except `but`."""
+    """Return which actions (S, A) of these parts depend on other parts: their outcomes differ between table and ghost.
+
+    They differ if the total variation is more than 0.1.  The outcomes are counted in the runs of all explorers and of all seeds except
+    `but`.  `parts`: parts with the same graph, counted together.
+    """
     shares = []
     for world in ("table", "ghost"):
         others = [run for explorer in EXPLORERS for run in runs.get((explorer, world), []) if run.seed != but]
@@ -372,7 +407,11 @@ def dependent(runs: Runs, parts: Sequence[str], but: int) -> NDArray[np.bool_]:
 
 
 def judged_of(runs: Runs, explorer: str, learner: str, score: str) -> list[Judged]:
-    """Judge every run of an explorer; empty if there is no other seed, or no action depends on other parts in the other seeds' runs."""
+    """Sort the actions of a learner in each run of an explorer by a score, and mark which depend on other parts.
+
+    `learner`: "torso" or "arms".  `score`: "tries", or "beside_ghost" for tries over those at the ghost.  A run is left out if in the runs
+    of other seeds no action depends on other parts, or if there are no runs of other seeds.
+    """
     found = []
     for run, ghost in with_ghosts(runs, explorer):
         truth = dependent(runs, LEARNERS[learner], run.seed)

@@ -75,12 +75,16 @@ Runs = Sequence[Mapping[str, Any]]  # values by seed, of one condition
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add --tune."""
+    """Add the option --tune: instead of the usual runs, measure the return with three numbers for each explorer."""
     parser.add_argument("--tune", action="store_true", help="instead: the return with every number of each explorer, with other seeds")
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return both tasks in every world; the short version has the small worlds alone."""
+    """Return the settings of the runs: the tasks "coverage" and "return" with every explorer in every world.
+
+    With --tune there is only "return", with other seeds, and with three numbers for each explorer (weight, bonus, or the like).  With
+    --quick there are only the two smallest worlds.
+    """
     worlds = ["RiverSwim-6", "DeepSea-10"] if arguments.quick else list(WORLDS)
     if arguments.tune:
         seeds = tuple(range(TUNING_SEED, TUNING_SEED + arguments.seeds))
@@ -97,7 +101,13 @@ def _condition(task: str, world: str, explorer: str, number: float = 0.0, seeds:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Explore one world."""
+    """Explore one world, either until everything was tried ("coverage") or for rewards ("return").
+
+    "coverage" returns `pairs`, the number of actions in reachable states; `once` and `often`, transitions until each was tried once and
+    five times, at most `most`; `finished`, whether each of both was achieved; and `error`, the L1 error of the beliefs.  "return" returns
+    `best`, the mean reward per action under the best policy; `share`, the mean reward divided by it; and `earned`, the sum of rewards at
+    100 times.
+    """
     world = WORLDS[settings["world"]](seed)
     plant = RewardedPlant(world, seed)
     if settings["task"] == "coverage":
@@ -111,7 +121,7 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def best_reward(plant: RewardedPlant) -> float:
-    """Return the mean reward of an action under the best policy."""
+    """Return the mean reward per action under the best policy, from the present state of the plant."""
     values, _ = policy_iteration(plant, plant.truth, NEAR_ONE)
     return float(values[plant.state] * (1.0 - NEAR_ONE))
 
@@ -173,7 +183,7 @@ def _covering(plant: RewardedPlant, name: str, seed: int) -> dict[str, Any]:
 
 
 def reached_from(plant: TabularPlant) -> Array:
-    """Return whether each state can be reached from the state of the plant, (S,) bool."""
+    """Return which states can be reached from the present state of the plant, (S,) bool."""
     reached = np.zeros(len(plant.space), dtype=bool)
     reached[plant.state] = True
     while True:
@@ -184,7 +194,10 @@ def reached_from(plant: TabularPlant) -> Array:
 
 
 def distance(plant: TabularPlant, agent: CuriousAgent, reachable: Array) -> float:
-    """Return the mean distance (L1) of the agent's debiased beliefs from the truth, over the actions of the reachable states."""
+    """Return the mean L1 distance, 0 to 2, of the agent's debiased beliefs from the true outcomes of the plant.
+
+    `reachable`: (S,) bool, the states whose actions are counted.
+    """
     believed = agent.model.debiased()
     difference = _dense(plant) - _dense(believed)
     return float(np.abs(difference).sum(axis=2)[reachable].mean())
@@ -199,13 +212,17 @@ def _dense(model: Any) -> Array:
 
 
 def groups(found: Cells, task: str) -> dict[tuple[str, str, float], Runs]:
-    """Return the values of the runs of a task by world, explorer and number."""
+    """Group the values of the finished runs of a task, "coverage" or "return", by (world, explorer, number of the explorer)."""
     every = grouped_by(found, "task", "world", "explorer", "number")
     return {key[1:]: runs for key, runs in every.items() if key[0] == task}
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return a row for each condition, and for each number the mean share of the best return over the worlds."""
+    """Return the results: "runs" has a row for each task, world and explorer.
+
+    "mean_share_of_the_best_return" has for each explorer, with its number, the mean over the worlds of its share of the best policy's
+    reward.
+    """
     rows: dict[str, Any] = {}
     for (world, explorer, _), runs in groups(found, "coverage").items():
         rows[f"coverage, {world}, {explorer}"] = {name: _summary(runs, name) for name in ("once", "often", "error")} | {
@@ -227,7 +244,10 @@ def _summary(runs: Runs, name: str) -> list[float]:
 
 
 def plot(found: Cells) -> Any:
-    """Draw, for each world, the transitions until everything was tried once and five times, and the share of the best return."""
+    """Draw, for each world, how many transitions each explorer needs to try everything, and its share of the best policy's reward.
+
+    Returns a matplotlib figure.
+    """
     covered, earned = groups(found, "coverage"), groups(found, "return")
     worlds = [world for world in WORLDS if any(key[0] == world for key in (*covered, *earned))]
     drawing = new_figure(3.4 * len(worlds), 6.4)

@@ -49,7 +49,10 @@ MANY_MORE = 2.0  # ratio
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return both lattices; the short version makes a fifth of the transitions."""
+    """Return the settings of the runs: the lattices "small" (20 to 80 % of the ranges) and "stretched" (12.5 to 87.5 %).
+
+    With --quick the runs have a fifth of the transitions.
+    """
     share, name = (QUICK, "quick-") if arguments.quick else (1.0, "")
     return [
         Condition(f"{name}{lattice}", {"lattice": lattice, "transitions": round(share * actions)}, actions)
@@ -58,10 +61,11 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Explore, and record self-contacts.
+    """Explore one lattice, and record the self-contacts during each action.
 
-    Returns `seen`, the transitions (T, 3); `values` (256, 8); `pairs`, the pairs of links that touched; and of each transition the index of
-    the pair (-1: none) in `touching`, and the depth [m] of the deepest self-contact (0: none) in `depths`.
+    Returns `seen` (T, 3), the transitions: state, action, state reached; `values` (256, 8) [nats] at the end; `pairs`, the names of the
+    pairs of links that touched; and for each transition `touching` (T,), the index in `pairs` of the pair that touched (-1: none), and
+    `depths` (T,), the depth [m] of the deepest self-contact (0: none).
     """
     space, plant = arm_space(LEVELS[settings["lattice"]]), arm_plant(seed)
     begin_anywhere(space, plant, seed)
@@ -87,21 +91,27 @@ def _numbered(contacts: list[SelfContact | None]) -> tuple[list[str], NDArray[np
 
 @dataclass(frozen=True, slots=True)
 class SelfContact:
-    """The deepest overlap of two fields during an action."""
+    """The deepest overlap of two fields during an action: the names of both links, and the depth [m]."""
 
     pair: tuple[str, str]  # links
     depth: float  # m
 
 
 class SelfContactPlant(WrappedPlant[OfflinePlant]):
-    """A plant with exactly the same actions, which records in `contacts` a SelfContact, or None, for every action so far."""
+    """A plant that performs exactly the same actions as the plant inside, and records the self-contact of each action.
+
+    `contacts`: for each action so far the deepest self-contact, or None without one.
+    """
 
     def __init__(self, plant: OfflinePlant) -> None:
         super().__init__(plant)
         self.contacts: list[SelfContact | None] = []
 
     def act(self, part: str, target: Array) -> Outcome:
-        """See Plant; runs the plant from one settle test to the next."""
+        """Perform an action as `mobee.plant.Plant.act` does, and record its deepest self-contact in `contacts`.
+
+        The outcome does not name touched objects.
+        """
         plant, settle = self.inner, self.inner.controller.gains.settle
         where, start = self.robot.part(part).slice, plant.time - plant.dt
         test, ticks = SettleTest(settle, start), _ticks(settle.first_check, plant.dt)
@@ -134,7 +144,12 @@ def _ticks(time: float, dt: float) -> int:
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """One exploration; see `trial`."""
+    """The results of one exploration of the lattice `space`.
+
+    `seen` (T, 3): transitions; state, action, state reached.  `values` (256, 8): values of the actions at the end [nats].  `pairs`: names
+    of the pairs of links that touched.  `touching` (T,): index in `pairs` for each transition, -1 without contact.  `depths` (T,): depth
+    [m] of the deepest self-contact, 0 without contact.
+    """
 
     space: Lattice
     seen: Ints
@@ -150,17 +165,17 @@ class Run:
 
     @property
     def unreached(self) -> tuple[int, ...]:
-        """States that were never reached."""
+        """The states that were never reached."""
         return tuple(np.flatnonzero(self.visits == 0).tolist())
 
     @property
     def succeeded(self) -> NDArray[np.bool_]:
-        """Whether each transition ended in its goal, (T,)."""
+        """Whether each transition ended in its goal state, (T,)."""
         return np.asarray(self.seen[:, 2] == goals_of(self.space, self.seen))
 
     @property
     def touched(self) -> NDArray[np.bool_]:
-        """Whether the arm touched the body in each transition, (T,)."""
+        """Whether fields of two links overlapped during each transition, (T,)."""
         return np.asarray(self.touching >= 0)
 
     @property
@@ -173,7 +188,7 @@ Runs = Mapping[str, list[Run]]  # by lattice
 
 
 def runs_of(found: Cells) -> Runs:
-    """Return the finished runs of each lattice."""
+    """Group the finished runs by lattice, "small" or "stretched"; each group is sorted by seed."""
 
     def of(result: CellResult) -> Run:
         values = result.values
@@ -185,7 +200,10 @@ def runs_of(found: Cells) -> Runs:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return rows of both lattices, unreached states, ends of the deflected actions, self-contacts by pair; and the claims."""
+    """Return the results: rows of both lattices, unreached states, ends of deflected actions, self-contacts, and the claims.
+
+    If not both lattices were run in full, the claims have no numbers.
+    """
     runs = runs_of(found)
     whole = all(lattice in runs and len(runs[lattice][0].seen) == actions for lattice, actions in ACTIONS.items())
     return {
@@ -234,7 +252,11 @@ def _ends(runs: Sequence[Run], source: int, goal: int) -> dict[str, float]:
 
 
 def contacts_by_pair(runs: Sequence[Run]) -> dict[str, dict[str, float]]:
-    """Return for each pair of links the number of actions per run in which it touched, the deepest overlap, and their success."""
+    """Return, for each pair of links that touched in some run, numbers of the actions in which it touched.
+
+    The numbers are "actions_per_run", "deepest_mm", the deepest overlap, and "share_that_succeeds", the share that ended in their goals.
+    The pairs with most actions come first.
+    """
     table: dict[str, dict[str, float]] = {}
     for pair in sorted({pair for run in runs for pair in run.pairs}):
         group = [(run, run.touching == run.pairs.index(pair)) for run in runs if pair in run.pairs]
@@ -335,7 +357,10 @@ SIDE = 16  # states along an edge of the map
 
 
 def plot(found: Cells) -> Any:
-    """Draw outcomes, visits, tries and values as in figs. 7.8 and 7.9, and a map of unreached states: one row per lattice."""
+    """Draw outcomes, visits, tries and values as in figs. 7.8 and 7.9, and a map of unreached states, in a row for each lattice.
+
+    Returns a matplotlib figure.
+    """
     runs = runs_of(found)
     drawing = new_figure(17.0, 5.8 * len(runs))
     grid = drawing.add_gridspec(3 * len(runs), 3, width_ratios=(1.0, 1.0, 1.3))

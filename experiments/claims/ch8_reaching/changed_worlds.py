@@ -6,20 +6,22 @@ problem-tries, with at most 2 failed transitions per evaluation, and loses nothi
 Source: aim of this reproduction, to thesis 7.2.6, where actions "suddenly brought the robot somewhere else".  Published: no numbers.
 Run time: 20 minutes on 2 cores.
 
-The arm, targets, law and recommended learner of the experiment reach-predictors, at a table.  After 200 problem-tries a ball of 10 cm
-appears, the table is raised by 8 cm, or each joint is miscalibrated by 5 degrees; or nothing changes.  The 20 balls were drawn uniformly
-in the workspace, at least 12 cm from each target and away from the robot at home: the first that cost a learner without a detector 15 %
-of its score or more, and leave at least three quarters of an oracle's.  Each ball has one of the seeds.
+The arm, targets, law and recommended learner of the experiment reach-predictors, at a table.  After 200 problem-tries a ball with a radius
+of 10 cm appears, the table is raised by 8 cm, or each joint is miscalibrated by 5 degrees; or nothing changes.  The 20 balls were drawn
+uniformly in the workspace, at least 12 cm from each target and away from the robot at home.  They are the first that cost a learner without
+a detector 15 % of its score or more, and leave at least three quarters of an oracle's score.  Each ball has one of the seeds.
 
-The oracle of the new world plans as the learners do, but with the rewards of one reach from each state for each target, and with the
-transitions that failed in two tries without a target; failures due to targets it has learned in three tries of each.  As its rewards are
-single samples, a learner can exceed it.  With the ball number 12 it is far too low (.83, while learners have 4.6): the oracle gets into
-states from which it knows no failures, because the robot entered them in no measurement, and stays there.  The interquartile mean leaves
-this ball out.  The oracle's encoders are as wrong as the learners'.  The learners have no detector; a fixed rate, by
-which a change is assumed after every 100 outcomes; a generalised likelihood ratio of two windows; or the posterior over run lengths.  A
-fifth one has that detector, too, and sees where its hand is after each action.  What it sees has an error of 5 mm along each axis (standard
-deviation).  Its plant corrects the encoders by it (`mobee.vision.calibration.self_calibration`).  During evaluations the hand is not seen,
-because they measure what was known before.  All are judged by the true place of the hand.
+The oracle of the new world plans as the learners do, but it knows the reward of one reach from each state for each target, and the
+transitions that failed in at least one of two tries without a target.  Failures due to targets it has learned in three tries of each.  As
+its rewards are single samples, a learner can exceed its score.  With the ball number 12 the oracle's score is far too low (.83, while
+learners have 4.6): the oracle gets into states from which it knows no failures, because the robot entered them in no measurement, and stays
+there.  The interquartile mean leaves this ball out.  The oracle's encoders are as wrong as the learners'.
+
+There are five learners.  Four have no detector; a fixed rate, by which a change is assumed after every 100 outcomes; a generalised
+likelihood ratio of two windows; or the posterior over run lengths.  The fifth has the detector by run lengths, too, and sees where its hand
+is after each action, with an error of 5 mm along each axis (standard deviation).  Its plant corrects the encoders by what it sees
+(`mobee.vision.calibration.self_calibration`).  During evaluations the hand is not seen, because they measure what was known before.  All
+learners are judged by the true place of the hand.
 """
 
 from __future__ import annotations
@@ -74,13 +76,16 @@ TRUTH_SEED = 9001  # of the plants on which an oracle's knowledge is measured
 
 
 class FixedRate:
-    """A detector that reports a change after every 100 outcomes: forgetting at a rate that is set by hand."""
+    """A detector that reports a change after every 100 outcomes, so that the learner forgets at a fixed rate."""
 
     def __init__(self) -> None:
         self._outcomes = 0
 
     def add(self, learned: float, unknown: float) -> int | None:
-        """See mobee.learning.reaching.changes.Detector."""
+        """Count an outcome; returns 100 at every hundredth outcome, else None.
+
+        The probabilities are not used.  As in `mobee.learning.reaching.changes.Detector.add`.
+        """
         self._outcomes += 1
         return None if self._outcomes % 100 else 100
 
@@ -88,16 +93,21 @@ class FixedRate:
 class LikelihoodRatio:
     """A detector by the generalised likelihood ratio of two windows with different shares of contradicting outcomes.
 
-    The outcomes since the last change are divided into two windows where their likelihood is largest.  A change is reported if its
-    logarithm exceeds that of a single window by more than two terms: the Bayesian information criterion of two further parameters, and the
-    logarithm of the largest probability of a change that `RunLength` considers.
+    In a window, a constant share of the outcomes contradicts what was learned: these have the probability `unknown`, the others `learned`
+    (the arguments of `add`).  The outcomes since the last change are divided into two windows where their likelihood is largest.  A change
+    is reported if the logarithm of this likelihood exceeds that of a single window by more than two terms: the Bayesian information
+    criterion of two further parameters, and the logarithm of the largest probability of a change that `RunLength` considers.
     """
 
     def __init__(self) -> None:
         self._logs: list[Array] = []
 
     def add(self, learned: float, unknown: float) -> int | None:
-        """See mobee.learning.reaching.changes.Detector."""
+        """Add an outcome; returns the number of outcomes since a change, if one is detected now, else None.
+
+        `learned`: probability or density of the outcome by what was learned; `unknown`: without any knowledge.  A change to fewer
+        contradicting outcomes is not reported.  As in `mobee.learning.reaching.changes.Detector.add`.
+        """
         self._logs.append(np.log((1.0 - SHARES) * learned + SHARES * unknown))
         if len(self._logs) < 2:
             return None
@@ -123,9 +133,9 @@ OURS, WITHOUT = "run length, sees its hand", "no detector"
 
 
 class Hand:
-    """The offsets of the encoders that were found by seeing the hand; they are kept when the world changes.
+    """What a learner knows by seeing its hand: `offsets`, the estimated errors of the encoders.
 
-    `is_seen`: whether the hand is seen at present.
+    They are kept when the world changes.  `is_seen`: whether the hand is seen at present.
     """
 
     def __init__(self, seed: int) -> None:
@@ -133,38 +143,44 @@ class Hand:
         self._rng = np.random.default_rng(seed)
 
     def see(self, plant: JudgedPlant) -> Array | None:
-        """Return where the hand is seen, (3,) m."""
+        """Return the position at which the hand is seen, (3,) m, with a random error of 5 mm along each axis; None if it is not seen."""
         error = self._rng.normal(0.0, NOISE, 3)
         return plant.marker_at(MARKER) + error if self.is_seen else None
 
     def correct(self, plant: JudgedPlant) -> SeenPlant:
-        """Return a plant whose encoders are corrected by where the hand is seen."""
+        """Return a plant that acts by `plant`, and corrects the encoders by the position at which the hand is seen."""
         return SeenPlant(SelfCalibratingPlant(plant, self.offsets, lambda: self.see(plant)), plant)
 
 
 class SeenPlant(WrappedPlant[SelfCalibratingPlant]):
-    """A self-calibrating plant whose reaches are judged by the true place of the hand, as those of the other learners."""
+    """A self-calibrating plant whose reaches are judged by the true position of the hand, as those of the other learners are.
+
+    `judge`: the plant inside, which knows the true position.
+    """
 
     def __init__(self, inner: SelfCalibratingPlant, judge: JudgedPlant) -> None:
         super().__init__(inner)
         self.model, self._judge, self._target = judge.model, judge, ReachTarget(np.zeros(3))
 
     def present(self, target: ReachTarget | None) -> None:
-        """See ReachPlant."""
+        """Present a target to the plant inside, or remove it (None); as in `mobee.reach.ReachPlant.present`.
+
+        The last target is kept to judge the reach.
+        """
         self._target = target or self._target
         super().present(target)
 
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
-        """See ReachPlant; the outcome has the true position of the marker and the true remaining error."""
+        """Reach as `mobee.reach.ReachPlant.reach` does; the outcome has the true position of the marker and the true error that remains."""
         found, where = super().reach(part, marker, stay), self._judge.reached
         return replace(found, marker=where, missing=self._target.missing(where))
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return every change, one ball a condition; the short version has one ball and a quarter of the tries.
+    """Return the settings of the runs: one for each change; the change "ball" has one for each of the 20 balls.
 
-    The world that does not change has ten times as many seeds: its claim is an equality to 1 %, and single scores have a standard
-    deviation of 1.8 %.
+    With --quick there is one ball, and a quarter of the tries.  The world that does not change has ten times as many seeds: its claim is an
+    equality to 1 %, and single scores have a standard deviation of 1.8 %.
     """
     quick = arguments.quick
     share, name = (4, "quick-") if quick else (1, "")
@@ -179,7 +195,11 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def plant_of(change: str, ball: int, seed: int) -> JudgedPlant:
-    """Return the arm at the table, after a change or, with "nothing", before."""
+    """Return the right arm at the table, after a change of the world.
+
+    `change`: "nothing" (also the world before every change), "ball", "table" (raised) or "turn" (miscalibrated joints).  `ball`: number of
+    the ball that appears, 0 to 19; used by the change "ball" alone.
+    """
     world = table_world()
     if change == "table":
         world.move("table", position=world.objects["table"].position + np.array([0.0, 0.0, RAISED]))
@@ -194,13 +214,13 @@ def plant_of(change: str, ball: int, seed: int) -> JudgedPlant:
 
 @cache
 def targets() -> list[ReachTarget]:
-    """Return the 27 targets of the thesis."""
+    """Return the 27 targets of the thesis: spheres of 10 cm on a grid in the workspace."""
     return targets_at(grid(), laws()[LAW].aim)
 
 
 @cache
 def model_of(seed: int) -> TransitionModel:
-    """Return the transition model of a curious agent at the table."""
+    """Return the transition model of a curious agent that has learned at the table for 3000 transitions."""
     plant = plant_of("nothing", -1, seed + 300).inner
     begin_anywhere(reach_space(), plant, seed)
     agent = CuriousAgent(reach_space(), plant, seed=seed)
@@ -209,11 +229,12 @@ def model_of(seed: int) -> TransitionModel:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Make every learner learn, change the world, and let it learn again; the oracle of the new world is measured, too.
+    """Let every learner learn, change the world, and let the learners learn again; the oracle of the new world is measured, too.
 
-    Returns for the D learners and L checkpoints `score` (D, L), the sum of the rewards, `failures` (D, L), failed transitions, and
-    `without` (D, L), targets without a reach, each the mean of the evaluations; `false` (D,), the number of changes that were detected
-    before there was one; `detected` (D,), problem-tries after the change until one was detected, inf if none was; and `oracle`, its score.
+    Returns for the D learners, after each of L numbers of problem-tries since the change, the means over the evaluations: `score` (D, L),
+    sum of the rewards; `failures` (D, L), failed transitions; `without` (D, L), targets without a reach.  `false` (D,): number of changes
+    detected before the world changed.  `detected` (D,): problem-tries after the change until one was detected, inf if none was.  `oracle`:
+    score of the oracle.
     """
     found = [_learned(*learner, settings, seed) for learner in LEARNERS.values()]
     names = ("score", "failures", "without", "false", "detected")
@@ -260,7 +281,11 @@ def _begin(plant: Plant, seed: int) -> None:
 
 @cache
 def oracle_score(change: str, ball: int) -> float:
-    """Return the score of the oracle of a world, mean of ten evaluations."""
+    """Return the score of the oracle in the world after a change, as a mean of ten evaluations.
+
+    The oracle is an agent that knows the measured rewards of all reaches and the transitions that fail.  `change`, `ball`: as in
+    `plant_of`.
+    """
     places, space = np.array([target.position for target in targets()]), reach_space()
     truth = Truth(places, rewards_missing(change, ball)[:, :, None], np.zeros((len(places), *space.goals.shape)))
     oracle = ReachAgent(
@@ -275,7 +300,10 @@ def oracle_score(change: str, ball: int) -> float:
 
 
 def rewards_missing(change: str, ball: int) -> Array:
-    """Measure the remaining error of one reach from each state for each target, (T, S) m; NaN where the state was not entered."""
+    """Measure one reach from each of the S states for each of the T targets; returns the remaining errors, (T, S) m.
+
+    NaN where the state was not entered.  `change`, `ball`: the world, as in `plant_of`.
+    """
     plant, space = plant_of(change, ball, TRUTH_SEED), reach_space()
     missing = np.full((len(targets()), len(space)), np.nan)
     for state in range(len(space)):
@@ -290,7 +318,10 @@ def rewards_missing(change: str, ball: int) -> Array:
 
 
 def blocked(change: str, ball: int) -> Array:
-    """Measure the share of two tries of each transition, without a target, that do not end in its goal, (S, A)."""
+    """Try each transition twice without a target, and return the share of tries that did not end in its goal, (S, A).
+
+    `change`, `ball`: the world, as in `plant_of`.  Tries that could not be made, because a state was not entered, count as successes.
+    """
     plant, space, rng = plant_of(change, ball, TRUTH_SEED), reach_space(), np.random.default_rng(0)
     left, failed = 2 * (space.goals != NO_ACTION), np.zeros(space.goals.shape)
     plant.present(None)
@@ -319,7 +350,7 @@ Runs = Mapping[tuple[str, str], list[dict[str, Any]]]  # by change and learner
 
 
 def runs_of(found: Cells) -> Runs:
-    """Return the results of each learner, as in `trial` but of one learner, by change and learner."""
+    """Group the results of the finished runs by (change, learner): those of `trial`, but of one learner each."""
     groups = grouped_by(found, "change")
     names = ("score", "failures", "without", "false", "detected")
     return {
@@ -331,17 +362,20 @@ def runs_of(found: Cells) -> Runs:
 
 
 def relative(runs: list[dict[str, Any]]) -> Array:
-    """Return the scores over the new oracle's, (N, L)."""
+    """Return the scores of N runs after L numbers of problem-tries, divided by the score of the new world's oracle, (N, L)."""
     return np.array([run["score"] / run["oracle"] for run in runs])
 
 
 def failures(runs: list[dict[str, Any]]) -> Array:
-    """Return the failed transitions per evaluation, (N, L)."""
+    """Return the mean number of failed transitions in an evaluation, of N runs after L numbers of problem-tries, (N, L)."""
     return np.array([run["failures"] for run in runs])
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return a row for each change and learner, and the claims."""
+    """Return the results: "learners" has a row for each change and learner, "claims" the judged claims.
+
+    If not every change was run, the claims have no numbers.
+    """
     runs = runs_of(found)
     rows = {f"{CHANGES[change]}; {learner}": _row(group) for (change, learner), group in runs.items()}
     return {"learners": rows, "claims": judged(CLAIMS, runs, len(runs) == len(CHANGES) * len(LEARNERS))}
@@ -404,7 +438,10 @@ CLAIMS = (
 
 
 def plot(found: Cells) -> Any:
-    """Draw scores and failed transitions over the problem-tries since the change: a column for each change."""
+    """Draw scores and failed transitions over the problem-tries since the change, in a column of panels for each change.
+
+    Returns a matplotlib figure.
+    """
     runs = runs_of(found)
     drawing = new_figure(16.0, 7.0)
     panels = drawing.subplots(2, len(CHANGES), sharex=True, sharey="row")

@@ -46,7 +46,7 @@ from mobee.errors import InvalidValue
 TRIES, CASES = 800, 40
 LAWS = ("published", "default")
 MEASURE = {"published": "reward", "default": "success"}
-"""The measure that is compared under each law: the reward of the thesis (eq. 8.4), or the share of successes."""
+"""The measure that is compared under each control law: the reward of the thesis (eq. 8.4), or the share of successes."""
 SOURCES = {"published": "thesis 5.3, 8.2, 9.3", "default": f"thesis 5.3, 8.2, 9.3; {OUR_AIM}, with its own law"}
 SITUATIONS = {
     "free": "from arbitrary poses to targets in free space",
@@ -71,14 +71,21 @@ Groups = Mapping[str, list[dict[str, Any]]]  # law -> values by seed
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return one condition per law: a learner, and all scenes."""
+    """Return the settings of the runs: one for each control law; its trial trains a learner, and tries all scenes.
+
+    With --quick there are fewer transitions, tries and cases.
+    """
     full = {"transitions": TRANSITIONS, "tries": TRIES, "cases": CASES}
     settings = {"transitions": 500, "tries": 50, "cases": 4} if arguments.quick else full
     return [Condition(law, settings | {"law": law}) for law in LAWS]
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Train the learner, and let all three methods attempt the same cases; returns arrays by "scene|method|measure"."""
+    """Train a learner, and let planner, reach and both together attempt the same cases of each scene.
+
+    Returns arrays (cases,) with keys "scene|method|measure".  The measures are "missing", the distance of the palm from the target's
+    surface [m]; "seconds", plant time; and "reward" (thesis eq. 8.4).
+    """
     law = settings["law"]
     agent = trained(seed, settings["transitions"], settings["tries"], law)
     found: dict[str, Any] = {}
@@ -92,7 +99,7 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the claims, and a row per law, scene and method."""
+    """Return the results: "claims" has the judged claims, "cases" a row for each law, scene and method."""
     groups = grouped(found, "law", LAWS)
     rows = []
     for law, scene, method in product(groups, SCENES, METHODS):
@@ -104,7 +111,10 @@ def findings(found: Cells) -> dict[str, Any]:
 
 
 def means(groups: Groups, law: str, scene: str, method: str, measure: str) -> Array:
-    """Return the mean of a measure over the cases, (seeds,); "success": the palm within 2 cm of the surface."""
+    """Return the mean of a measure over the cases, for each seed, (seeds,).
+
+    `measure`: one of `trial`, or "success", the share of cases with the palm within 2 cm of the target's surface.
+    """
     name = "missing" if measure == "success" else measure
     each = [values[f"{scene}|{method}|{name}"] for values in groups[law]]
     return np.array([(values <= GOOD if measure == "success" else values).mean() for values in each])
@@ -132,7 +142,10 @@ CLAIMS = tuple(
 
 
 def plot(found: Cells) -> Any:
-    """Draw bars with intervals, one panel per law; raises InvalidValue if the cells of a law are not finished."""
+    """Draw the compared measure of each scene and method as bars with intervals, a panel for each law.
+
+    Returns a matplotlib figure.  Raises InvalidValue if no cell of a law is finished.
+    """
     groups = grouped(found, "law", LAWS)
     if len(groups) < len(LAWS):
         raise InvalidValue("some cells are not finished: continue the run with --resume.")

@@ -83,7 +83,10 @@ SHOWN = "both"  # the roadmaps' model in the curves
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return straight motions, the MDP after different numbers of transitions, and the roadmaps under each belief."""
+    """Return the settings of the runs: straight motions, the MDP after 0 to 4000 transitions, and roadmaps of each wrong model.
+
+    With --quick there are 20 queries instead of 60.
+    """
     shared = {"queries": 20 if arguments.quick else QUERIES}
     learned = [Condition(f"mdp-{n}", {**shared, "learned": n}, 1.0 + n / 1000) for n in LEARNED]
     roadmaps = [Condition(f"roadmaps-{belief.replace(' ', '-')}", {**shared, "belief": belief}, 8.0) for belief in BELIEFS]
@@ -91,7 +94,12 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Send the rivals of a condition to all goals; returns arrays by "rival|measure"."""
+    """Let the planners of one kind (straight, MDP or roadmaps) answer all queries.
+
+    Returns `hard` (Q,), whether a straight motion had failed in the query; and arrays with keys "planner|measure".  The measures are
+    "success", "seconds" (plant time), "actions" and "repairs", each (Q,), and "cost", hours of plant time or thousands of poses checked
+    before the first query.
+    """
     scene, lattice = make_scene(seed, settings["queries"]), space()
     values: dict[str, Any] = {"hard": scene.is_hard}
     for name, rival, cost in _rivals(settings, seed, scene, lattice):
@@ -125,7 +133,11 @@ def _rivals(settings: dict[str, Any], seed: int, scene: Scene, lattice: Lattice)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """The true world, the errors of the planners' model, and Q queries, each from rest at `starts` to the cell of a lattice state."""
+    """The true world, the errors of the planners' model, and Q queries from rest to the cell of a lattice state.
+
+    `balls`: (B, 3) m, true positions.  `shifts`: (B, 3) m, believed minus true positions.  `turns`: (4,) rad, believed minus true joint
+    angles.  `starts`: (Q, 4) rad.  `goals`: (Q,) goal states.  `is_hard`: (Q,), whether the straight motion failed when it was tried.
+    """
 
     balls: Array  # (B, 3) m
     shifts: Array  # (B, 3) m, believed minus true positions
@@ -136,12 +148,12 @@ class Scene:
 
 
 def space() -> Lattice:
-    """Return the published lattice of rank 3 with 16 neighbours."""
+    """Return the published lattice of rank 3: 81 states of the left arm with 16 neighbours each."""
     return arm_space(RANK3, ARM_NEIGHBOURS)
 
 
 def world_of(balls: Array) -> World:
-    """Return a world with balls at these positions (B, 3) m."""
+    """Return a world with a ball of 3 cm radius at each of these positions (B, 3) m."""
     world = World()
     for number, position in enumerate(balls):
         world.add(f"ball {number}", sphere(RADIUS), position=position)
@@ -149,14 +161,18 @@ def world_of(balls: Array) -> World:
 
 
 def plant_of(scene: Scene, seed: int, start: Array) -> OfflinePlant:
-    """Return the true robot among the true balls, at rest at `start` (4,) rad."""
+    """Return an offline plant of the left arm among the true balls of a scene, at rest in the pose `start` (4,) rad."""
     plant = arm_plant(seed, world=world_of(scene.balls))
     place(plant, whole(start[None])[0])
     return plant
 
 
 def make_scene(seed: int, queries: int) -> Scene:
-    """Draw balls in the workspace, and queries; in half of them, or as many as are found, a straight motion does not reach the goal."""
+    """Draw the balls and the errors of a scene, and its queries.
+
+    In half of the queries, or fewer if fewer are found, a straight motion does not reach the goal.  Raises InvalidValue if no queries of
+    one of both kinds are found.
+    """
     rng = np.random.default_rng([seed, 75])
     balls = _balls(rng)
     shifts = rng.normal(size=balls.shape)
@@ -215,7 +231,7 @@ def _some(rng: np.random.Generator, queries: list[tuple[Array, int, bool]], coun
 
 
 def believed(scene: Scene, kind: str) -> Belief:
-    """Return a planner's model of a scene, one of the BELIEFS.
+    """Return the model of a scene that the planners believe, with errors of the kind `kind`.
 
     "true": without errors; "no cables": without the constraints of the shoulder's cables; "miscalibrated": balls wrong by 1 cm and joints
     by 3 degrees; "both": both errors; "gross": both, with three times the miscalibration.
@@ -227,7 +243,11 @@ def believed(scene: Scene, kind: str) -> Belief:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Answers:
-    """The results of Q queries."""
+    """The results of one planner in Q queries, each (Q,).
+
+    `success`: whether the goal was reached in time.  `seconds`: plant time, 120 s for queries that failed.  `actions`, `repairs`: numbers
+    of actions, and of actions that did not end as planned.
+    """
 
     success: NDArray[np.bool_]  # (Q,)
     seconds: Array  # (Q,) plant time, QUERY_TIMEOUT for queries that failed
@@ -236,7 +256,7 @@ class Answers:
 
 
 def answer(scene: Scene, rival: Rival, seed: int) -> Answers:
-    """Send a rival to every goal, in order; the noise is the same for all rivals."""
+    """Let a planner answer all queries of a scene in their order; the noise of a query is the same for all planners."""
     lattice = space()
     rows = []
     for number, goal in enumerate(scene.goals):
@@ -262,11 +282,11 @@ def answer(scene: Scene, rival: Rival, seed: int) -> Answers:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Row:
-    """The results of a rival.
+    """The results of one planner with one belief (the errors of its model), over the seeds.
 
-    `numbers`: of each of NUMBERS, the means over the queries, (seeds,); the plant time of queries that failed is the limit.  `cost`: hours
-    of plant time, or thousands of poses checked, before the first query.  `blocks`: plant time per query over blocks of queries, (seeds,)
-    each; a scene may have fewer queries than the settings ask for.
+    `numbers`: means over the queries, (seeds,), under "success", "hard" (success in hard queries), "seconds" (plant time; 120 s for queries
+    that failed), "actions" and "repairs".  `cost`: hours of plant time, or thousands of poses checked, before the first query.  `blocks`:
+    plant time per query in each block of 20 queries, (seeds,); the last blocks have fewer seeds if a scene has fewer queries.
     """
 
     numbers: dict[str, Array]
@@ -274,7 +294,7 @@ class Row:
     blocks: list[Array]
 
     def text(self, name: str) -> str:
-        """Return one of NUMBERS as text."""
+        """Return interquartile mean and interval of one of `numbers` as text; `name`: its key, as "success"."""
         values = self.numbers[name]
         return estimate(values, 1 if abs(interquartile_mean(values)) >= 2.0 else 2)
 
@@ -283,7 +303,10 @@ Rows = Mapping[tuple[str, str], Row]  # by rival and belief ("" for rivals witho
 
 
 def rows_of(found: Cells) -> Rows:
-    """Summarise the seeds of each rival and belief."""
+    """Return the row of each planner and belief, by (planner, belief); the belief is "" for planners without a model.
+
+    A belief is the kind of errors in the planner's model, as in `believed`.
+    """
     values: dict[tuple[str, str], dict[str, list[Array]]] = defaultdict(lambda: defaultdict(list))
     for result in found.values():
         belief = str(result.cell.settings.get("belief", ""))
@@ -305,14 +328,17 @@ def _row(measures: dict[str, list[Array]]) -> Row:
 
 
 def row_of(rows: Rows, rival: str, belief: str) -> Row:
-    """Return the row of a rival; raises InvalidValue if it has not run."""
+    """Return the row of a planner, `rival`, with a belief (a kind of errors, as in `believed`, or "").
+
+    Raises InvalidValue if the planner has no finished run.
+    """
     if (rival, belief) not in rows:
         raise InvalidValue(f"no finished cell of {rival!r} with belief {belief!r}: continue the run with --resume.")
     return rows[rival, belief]
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the claims, and a row per rival and belief."""
+    """Return the results: "claims" has the judged claims, "rivals" a row for each planner and kind of errors in its model."""
     rows = rows_of(found)
     table = [
         {"planner": rival, "its model": belief or "none"}
@@ -364,7 +390,10 @@ CLAIMS = (fails, insufficient)
 
 
 def plot(found: Cells) -> Any:
-    """Draw success and time of all rivals under each belief, and the time per query over the number of queries."""
+    """Draw success and time of all planners for each kind of errors in their model, and the time per query over the queries.
+
+    Returns a matplotlib figure.
+    """
     rows = rows_of(found)
     drawing = new_figure(15.0, 5.0)
     success, seconds, curves = drawing.subplots(1, 3)

@@ -70,7 +70,7 @@ GOLD, GREEN = (0.96, 0.62, 0.0), (0.25, 0.65, 0.3)  # RGB
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add --law and --scales."""
+    """Add the options --law, the control law, and --scales, the units of distances in the equations."""
     parser.add_argument("--law", choices=list(laws()), default="published", help="the control law of the arm (default: published)")
     parser.add_argument(
         "--scales",
@@ -83,7 +83,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return every strategy with every unit; --quick: 400 problem-tries with the first unit."""
+    """Return the settings of the runs: three strategies with every unit of distances (option --scales).
+
+    With --quick only the first unit is used, and there are 400 problem-tries.
+    """
     shared = {"law": arguments.law, "checkpoints": list(CHECKPOINTS[:3] if arguments.quick else CHECKPOINTS)}
     first, *others = arguments.scales[:1] if arguments.quick else arguments.scales
     few = tuple(range(arguments.seed, arguments.seed + min(arguments.seeds, FEW_SEEDS)))
@@ -96,7 +99,10 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Learn the outcomes of actions, then to reach; returns what `experiments.kit.reaching.learning.learn` does."""
+    """Learn the outcomes of actions, and then to reach for the 27 targets with one strategy.
+
+    Returns the arrays of `experiments.kit.reaching.learning.learn`, with evaluations under the name "grid".
+    """
     plant = reach_plant(seed, settings["law"])
     beliefs = learned_beliefs(plant, seed)
     agent = ReachAgent(reach_space(), plant, beliefs, marker=MARKER, strategy=settings["strategy"], scale=settings["scale"], seed=seed)
@@ -105,10 +111,10 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def summary(values: dict[str, Any]) -> dict[str, Any]:
-    """Reduce the values of a trial to those from which the claims and the figure are computed.
+    """Reduce the values of `trial` to those from which the claims and the figure are computed.
 
-    Rewards of an evaluation are added up, (L, R, 1); problem-tries between two checkpoints are sorted, as only their numbers count; times
-    and actions become their means.
+    Rewards of an evaluation are added up over the targets, (L, R, 1), for L evaluations of R repetitions.  Problem-tries between two
+    checkpoints are sorted, as only their numbers count.  Durations become the total `hours`, actions their mean.
     """
     state, problem = values["reach_state"].astype(np.int8), values["problem"].astype(np.uint8)
     between = np.searchsorted(CHECKPOINTS, np.arange(len(state)), side="right")
@@ -125,7 +131,10 @@ def summary(values: dict[str, Any]) -> dict[str, Any]:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return a row per unit and strategy, and the claims; those about problem-tries that were not made stay open."""
+    """Return the results: "runs" has a row for each unit and strategy, "claims" the judged claims.
+
+    Claims about problem-tries that were not made stay open.
+    """
     units = runs_of(found)
     results: dict[str, Any] = {"runs": {f"{name}, {unit}": _row(group) for unit, runs in units.items() for name, group in runs.items()}}
     whole = {unit: runs for unit, runs in units.items() if set(runs) == set(STRATEGIES)}
@@ -307,7 +316,10 @@ CLAIMS = (
 
 
 def plot(found: Cells) -> Any:
-    """Draw the runs with the first unit: scores, costs; for each strategy a row of choices and tries; the states most reached from."""
+    """Draw the runs with the first unit: scores, robot time and negative rewards; choices of states and tries; the most used states.
+
+    Choices and tries have a row of panels for each strategy.  Returns a matplotlib figure.
+    """
     runs = next(iter(runs_of(found).values()))
     drawing = new_figure(15.0, 5.0 + 2.6 * len(runs) + 3.9)
     drawing.get_layout_engine().set(w_pad=0.1)  # inches: so that labels do not touch the panel on their left

@@ -46,7 +46,10 @@ MIN_LENGTH = 0.15  # m, of a path that is shown
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Episode:
-    """A reach that succeeded: its target, its actions, and the motion until the hand arrived."""
+    """A reach that succeeded.
+
+    `target`: what was reached.  `done`: the try, with its actions before the reach.  `motion`: of the robot until the hand arrived.
+    """
 
     target: ReachTarget
     done: Try
@@ -54,14 +57,14 @@ class Episode:
 
 
 def table_plant(seed: int, joints: Sequence[str] = RIGHT) -> OfflinePlant:
-    """Return a plant in which these joints of the right arm move, at the table without the ball."""
+    """Return an offline plant of the iCub at the table, without the ball; only these joints of the right arm move."""
     world = mobee.load_world("table")
     world.remove("ball")
     return OfflinePlant(Model(mobee.load_robot("icub"), world), seed, active=joints)
 
 
 def learn(file: Path, seed: int = 0, tries: int = TRIES, transitions: int = TRANSITIONS) -> None:
-    """Learn transitions and then reaches at the table, recorded in a file."""
+    """Learn transitions and then to reach for the 27 targets at the table; everything is recorded in `file`."""
     plant = table_plant(seed)
     space = Lattice(plant.robot, RIGHT, RANK3, ARM_NEIGHBOURS)
     with TransitionStore(file, PART) as store:
@@ -74,7 +77,7 @@ def learn(file: Path, seed: int = 0, tries: int = TRIES, transitions: int = TRAN
 
 
 def episodes(agent: ReachAgent, plant: OfflinePlant, count: int, seed: int) -> list[Episode]:
-    """Reach `count` times for random targets of the agent, each time from a random state; returns the reaches that succeeded."""
+    """Try `count` times to reach a random target of the agent from a random state; returns the reaches that succeeded."""
     rng, found = np.random.default_rng([seed, 8]), []
     for _ in range(count):
         agent.evaluate([], 1)  # puts the robot in a random state
@@ -90,7 +93,11 @@ def episodes(agent: ReachAgent, plant: OfflinePlant, count: int, seed: int) -> l
 
 
 def selected(paths: Sequence[Array]) -> dict[str, int]:
-    """Return the index of the clearest example of each kind among paths (T, 3) m; no path is chosen for two kinds."""
+    """Return the index of the clearest example of each kind of path, among paths (T, 3) m of the hand.
+
+    The kinds are "From above", "Far" and "Around the target".  No path is chosen for two kinds, and none shorter than 15 cm, so that kinds
+    may be absent.
+    """
     left = [number for number, path in enumerate(paths) if _length(path) >= MIN_LENGTH]
     chosen: dict[str, int] = {}
     for name, measure in KINDS.items():
@@ -142,7 +149,10 @@ def _caption(marker: str, motion: Motion, moment: int) -> str:
 
 
 def film(file: Path, out: Path, seed: int, poses: int, height: int) -> list[str]:
-    """Draw selected reaches of the learner that is recorded in a file; returns their titles."""
+    """Draw filmstrips of selected reaches of the learner that is recorded in `file`, and return their titles.
+
+    `out`: path of the picture.  `poses`: pictures per reach.  `height`: of each, pixels.  Raises MobeeError if no reach is clear enough.
+    """
     with ReachStore(file, PART, read_only=True) as store:
         joints = store.settings()["space"]["joints"]
     plant = table_plant(seed + 1, joints)
@@ -157,7 +167,7 @@ def film(file: Path, out: Path, seed: int, poses: int, height: int) -> list[str]
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Learn unless the file of a learner exists, and draw."""
+    """Draw the filmstrips of the learner in a file; if the file does not exist, a learner is trained and written to it before."""
     parser = argparse.ArgumentParser(description="Draw selected reaches of a learner.")
     parser.add_argument(
         "run",

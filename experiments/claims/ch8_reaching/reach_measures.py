@@ -22,7 +22,11 @@ STRATEGIES = ("intrinsic", "greedy", "random")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Runs:
-    """The N runs of one strategy, by seed: values of their cells, and the computing time of each, s."""
+    """The N runs of one strategy, sorted by seed.
+
+    `values`: results of each run, as `reach_exploration.summary` returns them.  `seconds`: computing time of each, s.  `checkpoints`:
+    numbers of problem-tries after which the agents were evaluated; the argument `checkpoint` of the methods is one of them.
+    """
 
     values: tuple[Mapping[str, Any], ...]
     seconds: tuple[float, ...]
@@ -32,17 +36,20 @@ class Runs:
         return len(self.values)
 
     def scores(self, checkpoint: int) -> Array:
-        """Return the sum of the rewards of all targets, mean of the evaluations, (N,), as in figure 8.2."""
+        """Return the score of each run at a checkpoint, (N,): sum of the rewards of all targets, mean of the evaluations (fig. 8.2)."""
         at = self.checkpoints.index(checkpoint)
         return np.array([one["rewards_grid"][at].sum(axis=-1).mean() for one in self.values])
 
     def chosen(self, checkpoint: int) -> Array:
-        """Return the share of each state among those from which the evaluations reached, (N, S): figures 8.4 to 8.6."""
+        """Return how often the evaluations of each run reached from each of the S states, as shares, (N, S) (figs. 8.4 to 8.6)."""
         at = self.checkpoints.index(checkpoint)
         return np.array([_shares(one["states_grid"][at]) for one in self.values])
 
     def agreement(self, checkpoint: int) -> Array:
-        """Return the mean overlap of each run's choices with those of the other runs, (N,), 0 to 1."""
+        """Return how well the choices of states of each run agree with those of the other runs, (N,), from 0 to 1.
+
+        This is the mean overlap of their shares in `chosen`.
+        """
         chosen = self.chosen(checkpoint)
         overlaps = np.minimum(chosen[:, None], chosen[None]).sum(axis=-1)
         others = max(len(self) - 1, 1)
@@ -50,12 +57,12 @@ class Runs:
         return shared
 
     def states_of_half(self, checkpoint: int) -> Array:
-        """Return the smallest number of states from which half of a run's reaches started, (N,)."""
+        """Return the smallest number of states from which at least half of a run's reaches started in the evaluations, (N,)."""
         ordered = -np.sort(-self.chosen(checkpoint), axis=1)
         return np.array([np.searchsorted(np.cumsum(one), 0.5) + 1.0 for one in ordered])
 
     def height(self, checkpoint: int) -> Array:
-        """Return the mean height of the palm in the chosen states minus that in all states, (N,) m."""
+        """Return the mean height of the palm in the states that were reached from, minus that in all states, (N,) m."""
         heights = hands_of(reach_space(), MARKER)[:, 2]
         above: Array = self.chosen(checkpoint) @ heights - heights.mean()
         return above
@@ -65,25 +72,31 @@ class Runs:
         return np.array([float((_tried(one, slice(tries)) > 0).mean()) for one in self.values])
 
     def exploration(self, tries: int) -> Array:
-        """Return the mean number of reaches by target and state in the first `tries` problem-tries, (27, S): fig. 8.7."""
+        """Return how often each of the 27 targets was tried from each state in the first `tries` problem-tries, (27, S) (fig. 8.7).
+
+        The numbers are means over the runs.
+        """
         mean: Array = np.array([_tried(one, slice(tries)) for one in self.values]).mean(axis=0)
         return mean
 
     def concentration(self, first: int, last: int) -> Array:
-        """Return the share of the two most frequent states among the reaches of problem-tries `first` to `last`, (N,)."""
+        """Return the share of reaches that started in the two most frequent states, (N,).
+
+        Counted are the problem-tries from number `first` (counted from 0) up to, but without, `last`.
+        """
         sums = [np.sort(_tried(one, slice(first, last)).sum(axis=0))[::-1] for one in self.values]
         return np.array([one[:2].sum() / one.sum() for one in sums])
 
     def failures(self) -> Array:
-        """Return the number of negative rewards of each run during exploration, (N,)."""
+        """Return the number of negative rewards, one for each failed action, that each run received while it explored, (N,)."""
         return np.array([float(one["failures"].sum()) for one in self.values])
 
     def hours(self) -> Array:
-        """Return the robot time of exploration, (N,) h."""
+        """Return the robot time of the problem-tries of each run, without evaluations, (N,) h."""
         return np.array([float(one["hours"]) for one in self.values])
 
     def actions(self) -> Array:
-        """Return the mean number of actions per problem-try, (N,)."""
+        """Return the mean number of actions per problem-try of each run, reaches included, (N,)."""
         return np.array([float(one["mean_actions"]) for one in self.values])
 
 
@@ -106,7 +119,7 @@ Units = Mapping[str, ByStrategy]  # by unit of distances, as "1 cm"
 
 
 def runs_of(found: Cells) -> Units:
-    """Return the runs by unit of distances and strategy, in the order of the seeds."""
+    """Group the finished runs by unit of distances, as "1 cm", and then by strategy; each group is sorted by seed."""
 
     def of(result: CellResult) -> tuple[Mapping[str, Any], float, tuple[int, ...]]:
         return result.values, result.seconds, tuple(result.cell.settings["checkpoints"])

@@ -57,7 +57,7 @@ Fractions = dict[tuple[str, str], Array]  # learner and set -> (seeds, checkpoin
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options of a sweep, --law, --scale and --only."""
+    """Add the options of a sweep, and --law, --scale and --only."""
     sweep_arguments(parser)
     parser.add_argument("--law", choices=list(laws()), default="published", help="the control law of the arm (default: published)")
     parser.add_argument(
@@ -67,12 +67,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def places(quick: bool) -> dict[str, Array]:
-    """Return the positions of the targets that are tried and of those that never are, by name; --quick: nine and one."""
+    """Return the positions of the targets, (targets, 3) m, root frame, by set: "grid", which are tried, and "between", which never are.
+
+    With `quick` there are nine and one instead of 27 and eight.
+    """
     return {GRID: grid()[::3] if quick else grid(), BETWEEN: between()[:1] if quick else between()}
 
 
 def truths(arguments: argparse.Namespace) -> list[Cell]:
-    """Return the cells that measure the truth, one per target."""
+    """Return the cells that measure the true rewards and blocked transitions, one for each target."""
     settings: dict[str, Any] = {"what": TRUTH, "law": arguments.law, "tries": 1 if arguments.quick else TRIES}
     named = {name: found.tolist() for name, found in places(arguments.quick).items()}
     return [
@@ -83,7 +86,10 @@ def truths(arguments: argparse.Namespace) -> list[Cell]:
 
 
 def cells(arguments: argparse.Namespace) -> list[Cell]:
-    """Return the cells of the oracle and of every learner with every seed; --quick: 200 problem-tries."""
+    """Return the cells of the oracle and of every learner with every seed.
+
+    With --quick there are 200 problem-tries instead of 1600.
+    """
     settings: dict[str, Any] = {"law": arguments.law, "scale": arguments.scale, "quick": arguments.quick}
     seeds = range(arguments.seed, arguments.seed + arguments.seeds)
     checkpoints = [100, 200] if arguments.quick else list(CHECKPOINTS)
@@ -96,13 +102,20 @@ def cells(arguments: argparse.Namespace) -> list[Cell]:
 
 
 def measure_truth(cell: Cell) -> dict[str, Any]:
-    """Measure the rewards of all reaches for a target, and which transitions it blocks."""
+    """Measure the remaining errors of reaches from all states for the target of a cell, and the transitions that it blocks.
+
+    Returns the values of `experiments.kit.reaching.truth.Tried`.
+    """
     settings = cell.settings
     return measure(np.array(settings["place"]), settings["law"], settings["tries"]).values()
 
 
 def trial(truth: Truth, cell: Cell) -> dict[str, Any]:
-    """Learn (or plan with the true rewards), and evaluate on two sets of targets: those that are tried, and those that never are."""
+    """Run one learner, or the oracle with the measured `truth`, and evaluate it on both sets of targets.
+
+    Returns the arrays of `experiments.kit.reaching.learning.learn`, with evaluations under the names "grid", targets that are tried, and
+    "between", targets that never are.  The oracle has the arrays of the evaluations alone.
+    """
     settings, space = cell.settings, reach_space()
     plant, aim = reach_plant(cell.seed, settings["law"]), laws()[settings["law"]].aim
     beliefs = learned_beliefs(plant, cell.seed)
@@ -116,7 +129,10 @@ def trial(truth: Truth, cell: Cell) -> dict[str, Any]:
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Run the remaining cells: first those that measure the truth, then the oracle and the learners."""
+    """Run the cells that are not finished, and return the results: first the cells that measure the truth, then oracle and learners.
+
+    The truth of all targets is written to truth.npz in the folder.
+    """
     wanted = truths(arguments)
     run_cells(measure_truth, wanted, folder, arguments)
     found = load_cells(folder)
@@ -127,24 +143,30 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 def summary(values: dict[str, Any]) -> dict[str, Any]:
-    """Sum the rewards of oracle and learners over the targets: (L, R, 1).  A cell without them, the truth of a target, is not changed."""
+    """Reduce the values of a cell for the raw record: only rewards are kept, added up over the targets of an evaluation.
+
+    They are (L, R, 1), for L evaluations of R repetitions.  The values of a cell that measures the truth are not changed.
+    """
     rewards = {name: value for name, value in values.items() if name.startswith("rewards_")}
     return {name: value.sum(axis=-1, keepdims=True) for name, value in rewards.items()} or values
 
 
 def results(folder: Path) -> dict[str, Any]:
-    """Compute the findings from the finished cells."""
+    """Compute the results from the finished cells in the folder of a run."""
     return findings(load_cells(folder))
 
 
 def oracle_scores(found: Found, name: str) -> Array:
-    """Return the oracle's score on a set of targets, mean of a seed's evaluations, (seeds,)."""
+    """Return the oracle's score on a set of targets, "grid" or "between", for each seed, (seeds,): the mean of its evaluations."""
     runs = grouped(found, "what", [ORACLE]).get(ORACLE, [])
     return np.array([one[f"rewards_{name}"].sum(axis=-1).mean() for one in runs])
 
 
 def fractions(found: Found) -> Fractions:
-    """Return the scores of the learners, in the order of the seeds, divided by the oracle's mean score."""
+    """Return the scores of each learner, divided by the mean score of the oracle, (seeds, checkpoints).
+
+    The keys are (learner, set of targets).  Empty without finished cells of the oracle.
+    """
     curves: Fractions = {}
     for name in (GRID, BETWEEN):
         best = oracle_scores(found, name)
@@ -155,13 +177,13 @@ def fractions(found: Found) -> Fractions:
 
 
 def evaluated_after(found: Found) -> list[int]:
-    """Return the problem-tries after which the learners were evaluated."""
+    """Return the numbers of problem-tries after which the learners were evaluated; empty if no learner has finished."""
     given = [one.cell.settings["checkpoints"] for one in found.values() if "checkpoints" in one.cell.settings]
     return list(given[0]) if given else []
 
 
 def findings(found: Found) -> dict[str, Any]:
-    """Return a row per learner and set of targets, and the claims."""
+    """Return the results: the oracle's scores, a row for each learner and set of targets, computing times, and the judged claims."""
     curves, at = fractions(found), evaluated_after(found)
     rows = {
         f"{learner}, {_SETS[name]}": {str(checkpoint): estimate(column) for checkpoint, column in zip(at, curve.T, strict=True)}
@@ -226,7 +248,10 @@ CLAIMS = (*aimed, improves)
 
 
 def plot(found: Found) -> Any:
-    """Draw fractions of the oracle's score over problem-tries, for targets tried and targets never tried; crosses mark our aims."""
+    """Draw the learners' fractions of the oracle's score over the problem-tries, for both sets of targets; crosses are our aims.
+
+    Returns a matplotlib figure.  Raises InvalidValue if no learner or no oracle has finished.
+    """
     curves, at = fractions(found), evaluated_after(found)
     if not curves:
         raise InvalidValue("no learner has finished, or the oracle has not: continue the run with --resume.")
@@ -256,7 +281,7 @@ def _curve(axes: Any, at: list[int], curve: Array, learner: str, color: str, sty
 
 
 def figure(folder: Path) -> Path:
-    """Draw the finished cells."""
+    """Draw the finished cells in the folder of a run, and return the path of the picture."""
     return saved(plot(load_cells(folder)), folder)
 
 

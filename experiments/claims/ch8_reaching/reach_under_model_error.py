@@ -61,7 +61,7 @@ from mobee.reach import ReachTarget
 from mobee.roadmap.ompl import require_ompl
 
 WRONG = ("nothing", "planners", "everyone")
-"""Whose model is wrong: nobody's; the planners' alone; also MoBeE's, which has the same wrong encoders and target positions."""
+"""Whose model is wrong: nobody's; only the planners'; or everyone's, so that MoBeE has the same wrong joints and target positions."""
 SHIFT, TURN = 0.01, np.deg2rad(3.0)  # m and rad, errors of the believed target positions and joint angles
 UNSEEN = "unseen"  # name of the hidden ball
 RADIUS = 0.05  # m, of the hidden ball
@@ -73,7 +73,7 @@ TRIES = (5, 25, 50, 100, 200, 400, 800)  # after which the contestants are evalu
 REPETITIONS = 2  # of all targets in an evaluation
 COSTS = {"learner": 7.0, "none": 5.0, "blocked": 17.0, "missed": 23.0}  # s of processor time
 FATES = ("reached", "missed", "used up", "no plan")
-"""How a try ends: within 2 cm of the target; as planned, but not there; with the actions used up; with no path known."""
+"""How a try ends: within 2 cm of the target; as planned, but not there; with all actions used up; or without a plan."""
 
 HIDDEN = WRONG[1:]
 MARGIN, MIN_LEAD = 0.05, 0.2  # of success: a share at most this much lower counts as equal; a lead of this much is the aim
@@ -94,7 +94,10 @@ TITLES = {
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return the learner and each peer, under each kind of error."""
+    """Return the settings of the runs: the learner and each planner, if nobody's, the planners' or everyone's model is wrong.
+
+    With --quick there are at most 100 tries.
+    """
     tries = list(TRIES[:4] if arguments.quick else TRIES)
     return [
         Condition(f"{contestant}-{wrong}", {"contestant": contestant, "wrong": wrong, "tries": tries}, COSTS[contestant])
@@ -104,7 +107,11 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Learn, with evaluations after given numbers of tries; returns a row per evaluation."""
+    """Let one contestant learn, and evaluate it after each number of tries in the setting `tries`.
+
+    Returns `rows`, one for each evaluation, with the fields of `Score` and `hours`, the plant time so far; and the number of `targets`.
+    For a planner also `planning`, the processor time of each try [s], and `remembered`, the number of poses in its memory.
+    """
     contestant = settings["contestant"]
     scene = make_scene(seed, settings["wrong"])
     player: Contestant = Learner(scene, seed) if contestant == "learner" else Planner(scene, contestant, seed)
@@ -122,7 +129,11 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """Targets as MoBeE sees them, the ball's position (3,) m, and the errors of joints `turns` (4,) rad and targets `shift` (3,) m."""
+    """The task that all contestants of one seed get.
+
+    `targets`: as MoBeE sees them.  `ball`: position of the hidden ball, (3,) m, root frame.  `turns`: errors of the joints, (4,) rad.
+    `shift`: error of the target positions, (3,) m.  `wrong`: whose model has these errors, "nothing", "planners" or "everyone".
+    """
 
     targets: list[ReachTarget]
     ball: Array
@@ -131,27 +142,28 @@ class Scene:
     wrong: str
 
     def plant(self, seed: int, ball: bool = True) -> JudgedPlant:
-        """Return the true arm, with or without the ball."""
+        """Return a plant of the true arm, with or without the ball, whose reaches are judged by the true poses."""
         turns = np.zeros(len(body().motors))
         turns[[body().motor_index(name) for name in RIGHT]] = self.turns
         errors = Errors(turns, self.shift) if self.wrong == "everyone" else None
         return JudgedPlant(arm_plant(seed, _world(self.ball) if ball else None), errors, [UNSEEN])
 
     def belief(self) -> PeerBelief:
-        """Return the planners' model of the arm and the workspace."""
+        """Return the planners' model of arm and workspace; unless nothing is wrong, it lacks ball and cable constraints."""
         if self.wrong == "nothing":
             return arm_belief(_world(self.ball))
         return arm_belief(cables=False, turns=self.turns if self.wrong == "planners" else None)
 
     def seen(self, target: ReachTarget) -> ReachTarget:
-        """Return a target at the position that the planners believe."""
+        """Return a target at the position that the planners believe, which has an error if only the planners' model is wrong."""
         return replace(target, position=target.position + self.shift) if self.wrong == "planners" else target
 
 
 def make_scene(seed: int, wrong: str) -> Scene:
-    """Draw a ball that blocks motions, and errors of the sizes above; they are the same for every `wrong`.
+    """Draw a ball that blocks motions, and errors of joints (3 degrees) and targets (1 cm).
 
-    Targets of `touchable_targets` that cannot be touched because of the ball are left out.
+    They are the same for every `wrong`, which says whose model has the errors: "nothing", "planners" or "everyone".  Targets that cannot be
+    touched because of the ball are left out.
     """
     return replace(_drawn(seed), wrong=wrong)
 
@@ -197,33 +209,37 @@ def _ball(rng: np.random.Generator, targets: Array) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Score:
-    """The result of evaluation tries: the share of each of FATES (4,), and the mean plant time [s] and number of actions of a try."""
+    """The result of an evaluation.
+
+    `fates`: (4,), shares of tries that reached the target, missed it, used up their actions, and had no plan.  `seconds`: mean plant time
+    of a try.  `actions`: mean number of actions of a try.
+    """
 
     fates: Array
     seconds: float
     actions: float
 
     def values(self) -> dict[str, Any]:
-        """Return the fields as the values of a cell."""
+        """Return the fields as JSON values by name."""
         return {"fates": self.fates.tolist(), "seconds": self.seconds, "actions": self.actions}
 
 
 class Contestant(Protocol):
-    """Makes tries; an evaluation does not change what it has learned."""
+    """The interface of the learner and the planners: they make tries, and may learn from them."""
 
     def learn(self, tries: int) -> None:
-        """Make `tries` more tries, each for the target with the fewest tries so far (thesis 8.3.2)."""
+        """Make `tries` more tries, each for the target with the fewest tries so far (thesis 8.3.2), and learn from them."""
 
     def evaluate(self, repetitions: int) -> Score:
-        """Reach for all targets in random order, from a random state in each repetition (thesis 8.3.3)."""
+        """Try all targets in random order `repetitions` times, each time from a random state (thesis 8.3.3), without learning."""
 
     @property
     def hours(self) -> float:
-        """Plant time so far [h], with the learning before the first try and without evaluations."""
+        """The plant time so far [h], with the learning before the first try, and without evaluations."""
 
 
 class Learner:
-    """The reach learner; its transitions are learned before, in the same workspace without the unseen ball."""
+    """The reach learner; before the first try it learns the transitions in the same workspace, but without the hidden ball."""
 
     def __init__(self, scene: Scene, seed: int) -> None:
         alone = scene.plant(seed + 500, ball=False)
@@ -233,13 +249,13 @@ class Learner:
         self._seconds = alone.time
 
     def learn(self, tries: int) -> None:
-        """See Contestant."""
+        """Make `tries` more tries, and learn from them; as in `Contestant.learn`."""
         before = self._plant.time
         self.agent.learn(self._targets, tries)
         self._seconds += self._plant.time - before
 
     def evaluate(self, repetitions: int) -> Score:
-        """See Contestant."""
+        """Try all targets `repetitions` times without learning; as in `Contestant.evaluate`."""
         found = self.agent.evaluate(self._targets, repetitions)
         arrived = np.isfinite(found.missing)
         good = np.where(arrived, found.missing, np.inf) <= GOOD
@@ -248,12 +264,15 @@ class Learner:
 
     @property
     def hours(self) -> float:
-        """See Contestant."""
+        """The plant time so far [h], without evaluations; as in `Contestant.hours`."""
         return self._seconds / 3600.0
 
 
 class Planner:
-    """The planner that is compared: it plans with the model, and remembers its earlier tries."""
+    """A planner (inverse kinematics and RRT-Connect) that plans with its model, and remembers earlier tries.
+
+    `memory`: what it remembers: "none", "blocked" motions, or also poses that "missed" the target.
+    """
 
     def __init__(self, scene: Scene, memory: Memory, seed: int) -> None:
         self._scene, self._seed, self._tries, self._seconds = scene, seed, 0, 0.0
@@ -264,7 +283,7 @@ class Planner:
         """Processor time of each try so far, s."""
 
     def learn(self, tries: int) -> None:
-        """See Contestant."""
+        """Make `tries` more tries, and remember them; as in `Contestant.learn`."""
         for _ in range(tries):
             rng = np.random.default_rng([self._seed, 861, self._tries])
             target = self._problems.least_tried(self._scene.targets, rng)
@@ -274,7 +293,10 @@ class Planner:
             self._tries += 1
 
     def evaluate(self, repetitions: int) -> Score:
-        """See Contestant; the peer forgets a repetition at its end."""
+        """Try all targets `repetitions` times; as in `Contestant.evaluate`.
+
+        What the planner remembers from a repetition is forgotten at its end.
+        """
         tries: list[PeerTry] = []
         known = self.peer.knowledge()
         for repetition in range(repetitions):
@@ -287,7 +309,7 @@ class Planner:
 
     @property
     def hours(self) -> float:
-        """See Contestant."""
+        """The plant time of the tries so far [h], without evaluations; as in `Contestant.hours`."""
         return self._seconds / 3600.0
 
     def _try(self, target: ReachTarget) -> PeerTry:
@@ -304,7 +326,10 @@ def _score(tries: Sequence[PeerTry]) -> Score:
 
 
 def findings(done: Cells) -> dict[str, Any]:
-    """Return the claims, a row per contestant and kind of error, and the number of tries from which the learner is no worse."""
+    """Return the results: the judged claims, a row for each contestant and kind of error, and the crossovers.
+
+    A crossover is the number of tries from which the learner is no worse than a planner, for each seed.
+    """
     rows, crossings = [], []
     for wrong in WRONG:
         rows += [_row(done, contestant, wrong) for contestant in ("learner", *MEMORIES) if _of(done, contestant, wrong)]
@@ -334,19 +359,28 @@ def _row(done: Cells, contestant: str, wrong: str) -> dict[str, Any]:
 
 
 def verdict(leads: Mapping[str, Array], least: float) -> bool | None:
-    """Return whether the learner's lead (seeds,) over each of the peers is at least `least`; False if it is not over one of them."""
+    """Return whether the learner's lead in success over each planner is at least `least`, by the intervals.
+
+    `leads`: (seeds,) for each planner.  False if the lead over one planner is below `least`, None if that is undecided.
+    """
     return all_hold(decides(interval(lead), least=least) for lead in leads.values())
 
 
 def success(done: Cells, contestant: str, wrong: str) -> tuple[list[int], Array]:
-    """Return the numbers of tries after which a contestant was evaluated, and its share of successes at each, (seeds, points)."""
+    """Return the numbers of tries after which a contestant was evaluated, and its shares of successes, (seeds, points).
+
+    `wrong`: whose model is wrong, "nothing", "planners" or "everyone".
+    """
     found = _of(done, contestant, wrong)
     points = list(found[0].cell.settings["tries"]) if found else []
     return points, np.array([[row["fates"][0] for row in one.values["rows"]] for one in found]).reshape(len(found), len(points))
 
 
 def crossover(tries: list[int], learner: Array, peer: Array) -> Array:
-    """Return the number of tries from which each seed's learner stays no lower than the peer, (seeds,); inf where it ends lower."""
+    """Return, for each seed, the number of tries from which the learner's success is never again below the planner's, (seeds,).
+
+    `tries`: numbers of tries at the points.  `learner`, `peer`: shares of successes (seeds, points).  inf if the learner ends below.
+    """
     ahead = learner >= peer
     for_good = np.flip(np.cumprod(np.flip(ahead, 1), axis=1), 1).astype(bool)
     return np.where(for_good.any(axis=1), np.array(tries)[for_good.argmax(axis=1)], np.inf)
@@ -408,7 +442,10 @@ def _of(done: Cells, contestant: str, wrong: str) -> list[CellResult]:
 
 
 def plot(done: Cells) -> Any:
-    """Draw success over tries, one panel per kind of error; stars mark from where on the learner is no worse than a planner."""
+    """Draw the share of successes over the tries, a panel for each kind of error.
+
+    Stars mark from where on the learner is no worse than a planner.  Returns a matplotlib figure.
+    """
     drawing = new_figure(15.0, 4.6)
     for axes, wrong in zip(drawing.subplots(1, len(WRONG), sharey=True), WRONG, strict=True):
         for contestant, color in COLORS.items():

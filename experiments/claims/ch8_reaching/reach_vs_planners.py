@@ -77,7 +77,10 @@ Runs = list[dict[str, Any]]  # values by seed
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return the cases of the right arm, and the queries of both arms."""
+    """Return the settings of the runs: the cases of the right arm ("cases"), and the queries of both arms ("arms").
+
+    With --quick there are fewer transitions, tries, cases and queries.
+    """
     full: dict[str, Any] = {"transitions": TRANSITIONS, "tries": TRIES, "cases": CASES}
     cases = {"transitions": 500, "tries": 50, "cases": 4} if arguments.quick else full
     queries = 3 if arguments.quick else QUERIES
@@ -85,7 +88,11 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Let both attempt the same cases, or plan for both arms; returns arrays by "scene|contestant|measure", or by measure."""
+    """Let learner and planner attempt the same cases of the right arm, or plan paths of both arms.
+
+    For the cases, returns arrays (cases,) with keys "scene|contestant|measure"; the measures are "success", "missing" [m], "seconds" (plant
+    time) and "thinking" (processor time for plans, s).  For both arms, returns the fields of `PlannedQuery`, (queries,) each.
+    """
     if settings["scene"] == "two arms":
         queries = [plan_both_arms(1000 * seed + number) for number in range(settings["queries"])]
         return {name: np.array([getattr(query, name) for query in queries]) for name in ARM_MEASURES}
@@ -108,7 +115,7 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def planned(case: Case, seed: int, motors: MotorParameters | None) -> Attempt:
-    """Let the planner peer attempt a case."""
+    """Let the planner attempt a case of the right arm, and return the result; `motors`: None for the default motors."""
     plant = JudgedPlant(begun(case, seed, motors))
     start = plant.time
     if case.to is not None:
@@ -122,8 +129,9 @@ def planned(case: Case, seed: int, motors: MotorParameters | None) -> Attempt:
 class PlannedQuery:
     """The result of a query of both arms.
 
-    `found`: whether there is a path.  `seconds`, `smoothing`: processor time to find and to shorten it.  `corners`: poses of the path.
-    `missing`: the larger distance of a palm from its place at the end of the executed path, m.
+    `found`: whether there is a path.  `seconds`, `smoothing`: processor time to find the path, and to shorten it.  `corners`: number of
+    poses of the path.  `missing`: distance of a palm from its planned position at the end of the executed path, of the two palms the larger
+    one, m; inf without a path.
     """
 
     found: bool
@@ -134,7 +142,7 @@ class PlannedQuery:
 
 
 def plan_both_arms(seed: int) -> PlannedQuery:
-    """Draw first poses, plan a path of both arms to the cup, and follow it through MoBeE."""
+    """Draw first poses of both arms, plan a path to the cup, and follow it through MoBeE; returns times and remaining error."""
     rng = np.random.default_rng([seed, 15])
     model = Model(body(), table_and_cup())
     both = _belief(model, tuple(SIDES))
@@ -152,7 +160,7 @@ def plan_both_arms(seed: int) -> PlannedQuery:
 
 
 def table_and_cup() -> World:
-    """Return the world of the two arms' problem."""
+    """Return the world in which both arms plan: a table, and a cup on it."""
     world = World()
     world.add("table", box(0.6, TABLE_WIDTH, 0.5), position=(EDGE - 0.3, 0.0, TOP - 0.25))
     world.add("cup", cylinder(0.03, 0.1), position=CUP)
@@ -215,7 +223,7 @@ def _followed(both: PeerBelief, path: Array, seed: int) -> float:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the claims, a row per scene and contestant, and the numbers of both arms."""
+    """Return the results: the judged claims, a row for each scene and contestant, and the numbers of both arms."""
     cases, arms = _of(found, "cases"), _of(found, "two arms")
     rows = [
         {
@@ -242,12 +250,15 @@ def _of(found: Cells, kind: str) -> Runs:
 
 
 def of_cases(cases: Runs, scene: str, contestant: str, measure: str) -> Array:
-    """Return the mean of a measure over the cases of each seed, (seeds,)."""
+    """Return the mean of a measure of `trial` over the cases, for each seed, (seeds,); `cases`: values by seed."""
     return np.array([values[f"{scene}|{contestant}|{measure}"].mean() for values in cases])
 
 
 def of_queries(arms: Runs, measure: str) -> Array:
-    """Return the median over the queries of each seed, (seeds,): of "seconds" over all queries, else over those with a path."""
+    """Return the median of a field of `PlannedQuery` over the queries of each seed, (seeds,); `arms`: values by seed.
+
+    "seconds" is over all queries, the other fields over those with a path; seeds without any are left out.
+    """
     counted = [values[measure][slice(None) if measure == "seconds" else values["found"].astype(bool)] for values in arms]
     return np.array([float(np.median(values)) for values in counted if len(values)])
 
@@ -304,7 +315,7 @@ CLAIMS = (
 def plot(found: Cells) -> Any:
     """Draw success and planning time of learner and planner, and the planner's times for both arms.
 
-    Raises InvalidValue if cells are not finished.
+    Returns a matplotlib figure.  Raises InvalidValue if the cases or the queries of both arms have no finished run.
     """
     cases, arms = _of(found, "cases"), _of(found, "two arms")
     if not cases or not arms:

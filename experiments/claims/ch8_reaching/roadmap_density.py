@@ -60,7 +60,10 @@ Groups = dict[float, list[dict[str, Any]]]  # spacing -> values by seed, the wid
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return one condition per density; the short version has two densities and two queries."""
+    """Return the settings of the runs: one for each spacing of the roadmap.
+
+    With --quick there are two spacings, and two queries instead of ten.
+    """
     spacings, queries = (SPACINGS[:2], 2) if arguments.quick else (SPACINGS, QUERIES)
     return [
         Condition(f"d{1e3 * spacing:g}-q{queries}", {"spacing": spacing, "queries": queries}, (0.01 / spacing) ** 2 + 0.3)
@@ -69,7 +72,13 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Put cups on the table, and move around them; returns arrays (queries,) by "mode|measure", and the size of the roadmap."""
+    """Put a cup beside the path of each query, and move around it after bumps, with both modes of removing edges.
+
+    Returns the number of `vertices` and `edges` of the roadmap; `invalid` (queries,), edges that are blocked; arrays (queries,) with keys
+    "mode|measure", of the modes "edge" and "around" of `walked` and the measures `arrived`, `bumps`, `edges` and `seconds` of a `Walk`; and
+    for the path executed in the first query `off`, the palm's error at its end, and `solid`, the deepest contact of solids, m (NaN: nothing
+    was executed).
+    """
     roadmap = built(settings["spacing"])
     found: dict[str, Any] = {"vertices": len(roadmap.q), "edges": len(roadmap.edges)}
     drawn = [draw_query(np.random.default_rng([seed, number]), roadmap) for number in range(settings["queries"])]
@@ -85,7 +94,10 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Query:
-    """A query from one vertex to another; `model`: with the cup; `blocked`: the edges on which solids would touch."""
+    """A query from one vertex of the roadmap to another.
+
+    `model`: robot and world with the cup.  `blocked`: edges, as pairs of vertices, on which solids would touch.
+    """
 
     start: int
     goal: int
@@ -95,7 +107,11 @@ class Query:
 
 @dataclass(frozen=True, slots=True)
 class Walk:
-    """The result of a query: vertices passed, bumps, edges begun, and duration of the motion [s]; `arrived`: False if no path remained."""
+    """The result of a query.
+
+    `path`: vertices passed.  `arrived`: False if no path to the goal remained.  `bumps`: number of bumps.  `edges`: number of edges begun.
+    `seconds`: duration of the motion.
+    """
 
     path: tuple[int, ...]
     arrived: bool
@@ -106,12 +122,15 @@ class Walk:
 
 @lru_cache(maxsize=2)
 def built(spacing: float) -> Roadmap:
-    """Build the pre-grasp roadmap with a spacing [m], each pose joined to its 8 nearest, no edge checked."""
+    """Build the pre-grasp roadmap with a spacing [m]; each pose is joined to its 8 nearest, and no edge is checked for contacts."""
     return build(replace(example(), spacing=spacing), "least_squares", neighbours=NEIGHBOURS)
 
 
 def draw_query(rng: np.random.Generator, roadmap: Roadmap) -> Query:
-    """Draw two vertices, and a cup beside the shortest path between them that leaves another path; raises MobeeError if none is found."""
+    """Draw two vertices, and a cup that blocks the shortest path between them, but leaves another path.
+
+    Raises MobeeError if none is found in 300 draws.
+    """
     places = roadmap.model.evaluate(roadmap.q).position(RIGHT)[:, :2]
     for _ in range(DRAWS):
         start, goal = (int(vertex) for vertex in rng.integers(len(places), size=2))
@@ -133,8 +152,8 @@ def draw_query(rng: np.random.Generator, roadmap: Roadmap) -> Query:
 def walked(roadmap: Roadmap, query: Query, mode: str) -> Walk:
     """Follow the shortest path of the remaining edges; after a bump go back to the beginning of the edge, and replan.
 
-    `mode` "edge": a bump removes its edge (thesis 4.2); "around": it also removes all edges that end within AROUND of the end of that edge,
-    except those that were passed; if no path remains, all edges without a bump of their own are used again.
+    `mode` "edge": a bump removes its edge (thesis 4.2).  "around": it also removes all edges with an end within 3 cm of the end of that
+    edge, except those that were passed; if no path remains, all edges without a bump of their own are used again.
     """
     removed: set[Edge] = set()
     bumped: set[Edge] = set()
@@ -191,7 +210,10 @@ def _is_free(path: list[int], blocked: frozenset[Edge]) -> bool:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return a row per density and mode, the executed paths, and the claims."""
+    """Return the results: "roadmaps" has a row for each spacing and mode, "executed" the executed paths, "claims" the claims.
+
+    With runs of one spacing only, the claims have no numbers.
+    """
     groups = grouped(found, "spacing", SPACINGS)
     rows = [
         {"vertices": runs[0]["vertices"], "spacing [mm]": 1e3 * spacing, "after a bump": NAMES[mode], "seeds": len(runs)}
@@ -204,7 +226,10 @@ def findings(found: Cells) -> dict[str, Any]:
 
 
 def numbers(runs: list[dict[str, Any]], mode: str, name: str) -> Array:
-    """Return the mean of a measure over the queries of each run, (n,)."""
+    """Return the mean of a measure over the queries of each run, (runs,).
+
+    `mode`: "edge" or "around", as in `walked`.  `name`: "arrived", "bumps", "edges" or "seconds", as in `Walk`.
+    """
     return np.array([float(np.mean(values[f"{mode}|{name}"])) for values in runs])
 
 
@@ -240,7 +265,7 @@ def comes_past(groups: Groups) -> Measured:
     "a very long time",
 )
 def grows(groups: Groups) -> Measured:
-    """Judge whether the densest roadmap needs more bumps than the sparsest."""
+    """Judge whether the densest roadmap needs more bumps than the sparsest one."""
     bumps = {runs[0]["vertices"]: numbers(runs, "edge", "bumps") for runs in groups.values()}
     sparsest, *_, densest = bumps.values()
     return f"bumps per query, by number of vertices: {texts(bumps, 1, '{}: {}')}", is_above(densest, sparsest)
@@ -258,7 +283,10 @@ CLAIMS = (comes_past, grows, fewer)
 
 
 def plot(found: Cells) -> Any:
-    """Draw edges that the cup blocks, bumps, and time until success over the density of the roadmap (thesis 4.4)."""
+    """Draw blocked edges, bumps and robot time until success over the number of vertices of the roadmap (thesis 4.4).
+
+    Returns a matplotlib figure.
+    """
     groups = grouped(found, "spacing", SPACINGS)
     vertices = [runs[0]["vertices"] for runs in groups.values()]
     drawing = new_figure(12.0, 3.6)

@@ -71,25 +71,28 @@ LABELS = {
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add --learner."""
+    """Add the option --learner: the reach learner of all variants."""
     parser.add_argument(
         "--learner", choices=list(LEARNERS), default=LEARNER, metavar="NAME", help=f"one of {', '.join(LEARNERS)} (default: {LEARNER})"
     )
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return the walks that measure the true outcomes, and every variant of learning."""
+    """Return the settings of the runs: the walks that measure the true outcomes, and the five variants of learning.
+
+    With --quick the runs have 2000 instead of 4000 actions.
+    """
     checkpoints = list(QUICK if arguments.quick else CHECKPOINTS)
     variants = [Condition(variant, {"variant": variant, "learner": arguments.learner, "checkpoints": checkpoints}) for variant in VARIANTS]
     return [Condition("truth", {"variant": WALK}, 2.0, WALKS), *variants]
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Walk, and return the transitions `seen` (T, 3); or learn, with an evaluation after given numbers of actions.
+    """Make a walk that tries every transition, or learn with one variant, with an evaluation after given numbers of actions.
 
-    Returns for a learner: `scores` (L, R), of L evaluations with R repetitions, NaN before the first target; `tries` and `failed` (L,),
-    the problem-tries and failed transitions so far; and for each evaluation n its transition model, `outcomes_n` and `probabilities_n`
-    (S, A, B).
+    A walk returns its transitions `seen` (T, 3).  A learner returns, for L evaluations of R repetitions, `scores` (L, R), NaN before the
+    first target; `tries` and `failed` (L,), the problem-tries and the failed transitions so far; and for each evaluation n its transition
+    model, `outcomes_n` and `probabilities_n` (S, A, B).
     """
     if settings["variant"] == WALK:
         return {"seen": walk(reach_space(), reach_plant, TRIES, MAX_WALK, seed).astype(np.uint16)}
@@ -123,12 +126,12 @@ def _agent(variant: str, learner: str, seed: int) -> tuple[ReachAgent, OutcomeMo
 
 
 class BlamingPlant(WrappedPlant[ReachPlant]):
-    """A plant that reports false contacts: none ("model"), or the target's wherever a transition does not end in its goal ("target").
+    """A plant that reports false contacts, so that failures are always attributed to the model, or always to the target.
 
     Args:
-        plant: the true one.
+        plant: the plant inside, which performs the actions.
         space: its states and transitions.
-        blame: "model" or "target".
+        blame: "model": no contact is reported.  "target": contact with the target is reported if a transition does not end in its goal.
     """
 
     def __init__(self, plant: ReachPlant, space: Space, blame: Blame) -> None:
@@ -136,7 +139,7 @@ class BlamingPlant(WrappedPlant[ReachPlant]):
         self._space, self._blame = space, blame
 
     def act(self, part: str, target: Array) -> Outcome:
-        """See Plant; with false contacts."""
+        """Perform an action as `mobee.plant.Plant.act` does; the outcome reports the false contacts that `blame` names."""
         outcome = super().act(part, target)
         arrived = self._space.state_of(outcome.q) == self._space.state_of(target)
         return replace(outcome, touched=() if self._blame == "model" or arrived else (TARGET,))
@@ -144,10 +147,10 @@ class BlamingPlant(WrappedPlant[ReachPlant]):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Runs:
-    """The N runs of one variant: `scores` and model `errors` (N, L) after L numbers of `actions` (L,); NaN where not evaluated.
+    """The N runs of one variant, each evaluated after the L numbers of `actions` (L,).
 
-    `observed`: as `errors`, but only over transitions that the model has observed.  `tries`, `failed`: problem-tries and failed
-    transitions at the end, (N,).
+    `scores`, `errors`: (N, L), score and mean L1 error of the transition model; NaN where there was no evaluation.  `observed`: (N, L), the
+    error over the transitions that the model has observed.  `tries`, `failed`: (N,), problem-tries and failed transitions at the end.
     """
 
     actions: Ints
@@ -165,7 +168,10 @@ class _Beliefs:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return a row per variant, and the claims if every variant has runs."""
+    """Return the results: "variants" has a row for each variant, "claims" the judged claims.
+
+    The claims are absent if a variant has no run.
+    """
     runs = runs_of(found)
     results: dict[str, Any] = {"variants": [_row(variant, group) for variant, group in runs.items()]}
     if set(runs) == set(VARIANTS):
@@ -174,12 +180,12 @@ def findings(found: Cells) -> dict[str, Any]:
 
 
 def are_complete(runs: Mapping[str, Runs]) -> bool:
-    """Return whether every run is long enough for an evaluation at its end."""
+    """Return whether every run has an evaluation after its last action."""
     return all(np.isfinite(group.scores[:, -1]).all() for group in runs.values())
 
 
 def runs_of(found: Cells) -> dict[str, Runs]:
-    """Return the runs by variant, in the order of the seeds."""
+    """Return the runs of each variant, sorted by seed; the errors are NaN if no walk is finished."""
     walks = [values["seen"] for values in grouped(found, "variant", [WALK]).get(WALK, [])]
     truth = truth_of(reach_space(), np.concatenate(walks).astype(np.intp)) if walks else None
     checkpoints_of = {one.cell.settings["variant"]: one.cell.settings.get("checkpoints", []) for one in found.values()}
@@ -209,7 +215,10 @@ def _of_observed(group: Runs) -> str:
 
 
 def actions_to(least: float, actions: Ints, scores: Array) -> Array:
-    """Return the number of actions at which each run's scores (N, L) reach `least`, interpolated linearly, (N,); inf if never."""
+    """Return the number of actions after which the score of each run reaches `least`, (N,); inf if it never does.
+
+    `actions`: (L,), numbers at the evaluations.  `scores`: (N, L).  Between two evaluations the number is interpolated linearly.
+    """
     found = np.full(len(scores), np.inf)
     for n, run in enumerate(scores):
         enough = np.flatnonzero(run >= least)
@@ -221,9 +230,10 @@ def actions_to(least: float, actions: Ints, scores: Array) -> Array:
 
 
 def no_more(ours: Array, theirs: Array) -> bool | None:
-    """Return whether our runs (N,) need at most as many actions as theirs of the same seeds.
+    """Return whether our runs need at most as many actions as the runs of the same seeds that they are compared with.
 
-    None where the interval leaves that open, or where a run never reached the score, so that its number is not known.
+    `ours`, `theirs`: numbers of actions, (N,).  None if the interval of the differences leaves this open, or if a run never reached the
+    score, so that its number is inf.
     """
     if not np.isfinite([ours, theirs]).all():
         return None
@@ -231,7 +241,10 @@ def no_more(ours: Array, theirs: Array) -> bool | None:
 
 
 def level(ours: Array, theirs: Sequence[Array]) -> bool | None:
-    """Return whether our scores (N,) are at most MARGIN below each of theirs; False if they are farther below one of them."""
+    """Return whether our scores (N,) are at most 5 % below each of their scores (N,), of the same seeds.
+
+    False if ours are farther below one of them, None if the intervals leave this open.
+    """
     return all_hold(decides(interval(ours - other), least=-MARGIN * float(other.mean())) for other in theirs)
 
 
@@ -329,7 +342,10 @@ def _row(variant: str, group: Runs) -> dict[str, Any]:
 
 
 def plot(found: Cells) -> Any:
-    """Draw scores and errors of the models over the number of actions."""
+    """Draw the scores, and the L1 errors of the transition models, over the number of actions, a curve for each variant.
+
+    Returns a matplotlib figure.
+    """
     drawing = new_figure(12.0, 4.6)
     scores, errors = drawing.subplots(1, 2)
     for variant, group in runs_of(found).items():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Comparison of this library's reading of an original robot file with the rules of the program of 2014, pose by pose."""
+"""Comparison, pose by pose, of two readings of an original robot file: by this library and by the rules of the program of 2014."""
 
 from __future__ import annotations
 
@@ -24,7 +24,12 @@ SHRINKAGE = 1e-4  # m; a contact that ends when the volumes are smaller by this 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Differences of the two readings; the counts are 0 where they agree."""
+    """Differences between this library's reading of a file and that by the rules of 2014; the counts are 0 where they agree.
+
+    `poses`: number of compared poses.  `position_error`: largest distance between the positions of a volume's centre or a marker [m].
+    `rotation_error`: largest difference of a direction.  Counts of differences: `pairs`, tested pairs of volumes; `base`, volumes that are
+    tested against the world; `clauses`, clauses that hold; `contacts`, contacts.  `all_contacts`: number of all contacts.
+    """
 
     poses: int
     position_error: float  # m, largest distance between the centres of a volume, or the positions of a marker
@@ -37,12 +42,15 @@ class Comparison:
 
     @property
     def agrees(self) -> bool:
-        """Whether the readings are the same."""
+        """Whether both readings are the same, with directions and positions [m] within 1e-6."""
         return self.position_error < 1e-6 and self.rotation_error < 1e-6 and not (self.pairs or self.base or self.clauses or self.contacts)
 
 
 def compare(path: Path, robot: Robot, poses: int, seed: int) -> Comparison:
-    """Compare a robot with the program's reading of its file, at random motor positions within the limits."""
+    """Compare a robot as this library reads it from `path` with the reading of `program_2014.Program`.
+
+    They are compared at home and at `poses` - 1 random positions of the motors within the limits.  Raises ValueError if the volumes differ.
+    """
     program = Program.read(path)
     low, high = robot.limits.T
     drawn = np.random.default_rng(seed).uniform(low, high, (poses, len(robot.motors)))

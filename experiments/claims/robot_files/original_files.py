@@ -18,7 +18,11 @@ PRESENT_VERSION = b'version="2.0"'
 
 @dataclass(frozen=True)
 class Original:
-    """One distinct file: its content, and where it was found first."""
+    """One distinct file of 2010 to 2014, and where it was first found.
+
+    `hash`: Git's hash of the content.  `date`: of the oldest commit that contains it, as text; "" in a folder without a history.  `path`:
+    below the repository or folder.
+    """
 
     kind: Literal["robot", "world"]
     hash: str  # of Git: sha1 of "blob", length and content
@@ -29,15 +33,15 @@ class Original:
 
     @property
     def name(self) -> str:
-        """The date, name and hash of the file; different for every content."""
+        """The date, the name and the first digits of the hash of the file, joined by underscores; unique for every content."""
         return "_".join(word for word in (self.date, Path(self.path).stem, self.hash[:8]) if word)
 
 
 def find_originals(folders: list[Path]) -> list[Original]:
-    """Return every distinct robot or world file in the histories of the Git repositories below the folders.
+    """Return every distinct robot or world file of the format before 2.0 that is found in the given folders.
 
-    Where a folder has no repository with such files, those below the folder itself are returned.  Robots come before worlds, and older
-    files before newer ones.
+    If Git repositories below a folder have such files in their histories, these files are returned; otherwise the XML files below the
+    folder are returned.  Robots come before worlds, and older files before newer ones.
 
     Raises InvalidValue for a folder that does not exist, and if Git is not installed.
     """

@@ -2,8 +2,8 @@
 """Originals: whether this library reads the robot and world files of 2010 to 2014 as the programs of that time did.
 
 Claim: at least 95 % of the distinct files in the public histories of kailfrank/MoBeE and Juxi/icVision load as they are, and places,
-normals, limits, pairs, clauses and contacts are those of the program of 2014, by a second reading of its source (program_2014.py).
-Source: kailfrank/MoBeE (2014), Juxi/icVision (2010 to 2013); thesis 2.3.1.  Run time: three minutes with 20 poses a file.
+normals, limits, pairs, clauses and contacts are those of the program of 2014, by a second reading of its source (program_2014.py).  Source:
+kailfrank/MoBeE (2014), Juxi/icVision (2010 to 2013); thesis 2.3.1.  Run time: three minutes with 20 poses a file.
 
 The files are not part of this project.  Fetch the two repositories, and give the folder that holds them:
 
@@ -53,7 +53,7 @@ VIEW = (-40.0, 20.0)  # deg
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
+    """Add the command-line options of this experiment to the parser."""
     parser.add_argument(
         "--checkouts", nargs="+", type=Path, required=True, metavar="FOLDER", help="folders with the repositories, or with the files"
     )
@@ -83,7 +83,7 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 def results(folder: Path) -> dict[str, Any]:
-    """Write the table; returns how many files load and agree."""
+    """Write the table of the run in `folder`, and return the numbers of files that load and agree, and "passed"."""
     rows = read_records(folder / RECORDS, COLUMNS)
     write_table(rows, folder / TABLE)
     loaded = [row for row in rows if row["loads"] == "yes"]
@@ -143,7 +143,7 @@ def _read_as(path: Path) -> str:
 
 
 def write_table(rows: list[dict[str, str]], path: Path) -> None:
-    """Write all rows as a Markdown table, first robots, then worlds."""
+    """Write the rows as a Markdown table to `path`, first robots, then worlds.  `rows`: dicts with COLUMNS as keys."""
     lines = [f"| {' | '.join(HEADINGS)} |\n", "|---" * len(HEADINGS) + "|\n"]
     for row in sorted(rows, key=lambda one: (one["kind"], one["date"], one["file"], one["hash"])):
         compared = f"{row['poses']}, {row['contacts']}" if row["poses"] else ""
@@ -154,7 +154,10 @@ def write_table(rows: list[dict[str, str]], path: Path) -> None:
 
 
 def figure(folder: Path) -> Path:
-    """Draw the iCub of 2014, VirtualSkin's iCub, the Katana and the table world; raises InvalidValue if one of the files is missing."""
+    """Draw the iCub of 2014, VirtualSkin's iCub, the Katana and the table world to a file in `folder`; returns its path.
+
+    Raises InvalidValue if one of the files is missing.
+    """
     files, path = folder / "files", folder / "originals.png"
     icub, skin = _robot(files, ICUB), _robot(files, VIRTUAL_SKIN)
     with warnings.catch_warnings():

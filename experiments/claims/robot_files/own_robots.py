@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Own robots: whether URDFs of others work as they are, without expert knowledge.
+"""Own robots: whether URDFs by other authors work as they are, without expert knowledge.
 
-Claim: each of 28 robots with 4 to 300 motors stays within 0.5 degrees or 1 mm of its home; none has contacts with itself there after
-`mobee check --write-srdf` has written the pairs that do; each prismatic joint settles within 1 mm from 5 to 95 % of its range; and 250
-curious actions of an arm, from the file on, take at most 15 s.
-Source: aims of this reproduction; the thesis has one robot.  Published number: none.  Run time: 5 minutes.
+Claim: each of 28 robots with 4 to 300 motors stays within 0.5 degrees or 1 mm of its home; none has contacts with itself there after `mobee
+check --write-srdf` has written the pairs that do; each prismatic joint settles within 1 mm from 5 to 95 % of its range; and 250 curious
+actions of an arm, from the file on, take at most 15 s.  Source: aims of this reproduction; the thesis has one robot.  Published number:
+none.  Run time: 5 minutes.
 
 The robots are those of example-robot-data 6.0.0 and pybullet_data, and four extreme ones: a chain of 200 joints, a star of 300, and an arm
 six orders of magnitude too small and one three too large.  They have default gains and the motors of the offline plant, in an empty world,
-without fields.  Home and actions are also measured with fields of 3 cm, whose drift is printed and not judged: where fields overlap at
-home, they push.  The joints' true positions count; of a prismatic joint also the encoder's.  Times are those of this machine.  The figure
-is a table in Markdown.
+without fields.  Home and actions are also measured with fields of 3 cm; their drift is printed and not judged, because fields that overlap
+at home push the robot.  The joints' true positions count; of a prismatic joint also the encoder's.  Times are those of this machine.  The
+figure is a table in Markdown.
 """
 
 from __future__ import annotations
@@ -46,13 +46,16 @@ FIELD_SIZE = 0.03  # m
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
+    """Add the command-line options of this experiment to the parser."""
     parser.add_argument("--robots", nargs="+", choices=ROBOTS, default=list(ROBOTS), metavar="ROBOT", help=f"of {', '.join(ROBOTS)}")
     parser.add_argument("--data", type=Path, metavar="FOLDER", help="robots of example-robot-data (default: those of the package)")
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Measure the robots that are not in the records yet; returns the results."""
+    """Measure the robots that are not in the records in `folder` yet, and return the results of all.
+
+    Raises InvalidValue if example-robot-data or pybullet_data is needed and missing.
+    """
     examples = arguments.data or examples_folder()
     done = {row["robot"] for row in read_records(folder / RECORDS, Measured.columns())}
     done |= {row["robot"] for row in read_records(folder / REFUSED, ("robot", "why"))}
@@ -76,12 +79,12 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 def read(folder: Path) -> list[Measured]:
-    """Return the measured robots of a run."""
+    """Read the measurements of all robots of a run from its folder."""
     return [Measured.of_record(row) for row in read_records(folder / RECORDS, Measured.columns())]
 
 
 def failures(one: Measured) -> list[str]:
-    """Return the parts of the claim that a robot does not meet."""
+    """Return short texts that name the parts of the claim that a robot does not meet; [] if it meets all."""
     judged = {
         "drifts": one.drift_deg > MAX_DEGREES or one.drift_mm > MAX_MILLIMETRES,
         "touches itself at home": one.touching_after > 0,
@@ -92,7 +95,7 @@ def failures(one: Measured) -> list[str]:
 
 
 def results(folder: Path) -> dict[str, Any]:
-    """Return the worst value of each measure, and the robots that fail."""
+    """Return the worst value of each measurement over all robots of the run in `folder`, the robots that fail, and "passed"."""
     found, refused = read(folder), read_records(folder / REFUSED, ("robot", "why"))
     failed = {one.robot: failures(one) for one in found if failures(one)}
     return {
@@ -112,14 +115,14 @@ def results(folder: Path) -> dict[str, Any]:
 
 
 def figure(folder: Path) -> Path:
-    """Write the table, a line per robot; returns its path."""
+    """Write the table with a line per robot to a Markdown file in `folder`; returns its path."""
     path = folder / TABLE
     path.write_text("\n".join([*table(read(folder)), ""]), encoding="utf-8")
     return path
 
 
 def table(found: Sequence[Measured]) -> list[str]:
-    """Return the lines of the table in Markdown."""
+    """Return the measurements as the lines of a Markdown table, one robot per line."""
     heads = "robot | motors (slides) | solids | contacts at home | pairs written (s) | contacts then | drift [deg] | drift [mm] | "
     heads += "slides within [mm] | 250 actions [s] | touching after them | fields: drift [deg] | 250 actions [s] | touching after them"
     lines = [f"| {heads} |", "|---" * 14 + "|"]
@@ -135,7 +138,14 @@ def table(found: Sequence[Measured]) -> list[str]:
 
 @dataclass(frozen=True, slots=True)
 class Measured(Row):
-    """The measures of one robot; lengths in mm, angles in deg, times in s, -1 where there is nothing to measure."""
+    """The measurements of one robot; -1 where there is nothing to measure.
+
+    `motors`, `slides` and `shapes`: numbers of motors, of prismatic ones, and of shapes.  `touching`: solid contacts at home.  `written`:
+    pairs written to an SRDF; `touching_after`: contacts then; `srdf_s`: time to write [s].  `drift_deg`, `drift_mm`: largest distance of
+    revolute and prismatic motors from home, while home is the attractor for 10 s.  `slide_mm`: worst error of a prismatic joint;
+    `unsettled`: actions of prismatic joints that timed out.  `actions_s`: time from the file to the end of 250 curious actions [s];
+    `solid`: how many of them ended with solids in contact.  `field_...`: the same with fields of 3 cm.
+    """
 
     PLACES = 4
 
@@ -159,7 +169,7 @@ class Measured(Row):
 
 
 def measure(name: str, urdf: Path, folder: Path, seed: int) -> Measured:
-    """Measure a robot; its SRDF is written into the folder."""
+    """Measure one robot.  `urdf`: its file.  `folder`: for the SRDF that is written."""
     robot = load_robot(urdf)
     before = Model(robot).evaluate(robot.home)
     start = time.perf_counter()
@@ -222,7 +232,10 @@ def _slide(model: Model, index: int, seed: int) -> tuple[float, int]:
 
 
 def arm_of(robot: Robot) -> list[str]:
-    """Return up to ARM_JOINTS revolute motors of one part: those of the longest chain from the base on, then others of the part."""
+    """Return the names of up to four (ARM_JOINTS) revolute motors of one part, for an agent.
+
+    First come those of the longest chain of joints, from the base on, then other motors of the same part.
+    """
     chains: list[list[int]] = [[]]
     drive = {joint: k for k, motor in enumerate(robot.motor_table) for joint, _, _ in motor.joints}
     for index, joint in enumerate(robot.joints):

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The rules of the program of 2014, from a second reading of its source: a reference that shares nothing with mobee.robot.
 
-It reads files of 2011 to 2014 with the standard library's parser and keeps every <link> and <joint> as a node of a tree, as the
-program did (kailfrank/MoBeE: zphandler, kintreenode, transformable, linearconstraint). Positions in [m], angles in [deg], as in a file.
+It reads files of 2011 to 2014 with the standard library's parser and keeps every <link> and <joint> as a node of a tree, as the program did
+(kailfrank/MoBeE: zphandler, kintreenode, transformable, linearconstraint).  Positions in [m], angles in [deg], as in a file.
 """
 
 from __future__ import annotations
@@ -22,7 +22,11 @@ Array = NDArray[np.float64]
 
 @dataclass(eq=False)
 class Volume:
-    """A volume on a node: kind, size and pose relative to the start of its node."""
+    """A collision volume on a node of the tree.
+
+    `kind`: "sphere", "cylinder" or "box".  `size`: radius; radius and height; or three edges [m].  `position` (3,) m and `rotation` (3, 3):
+    relative to the start of the node.
+    """
 
     kind: str
     size: tuple[float, ...]
@@ -32,7 +36,12 @@ class Volume:
 
 @dataclass(eq=False)
 class Node:
-    """A <link> or <joint>."""
+    """A <link> or <joint> of a file, as a node of the tree.
+
+    `axis`: vector from start to end of a link [m], or rotation axis of a joint, (3,).  `limits`: of a joint [deg].  `motor`: name of the
+    motor of a joint.  `solids` and `fields`: its volumes.  `hand`: the node at or above this one with noSelfCollision="true"; None without
+    one.
+    """
 
     is_link: bool
     parent: Node | None
@@ -48,7 +57,11 @@ class Node:
 
 @dataclass
 class Program:
-    """The contents of a file as the program of 2014 reads them."""
+    """The contents of a robot file as the program of 2014 reads them.
+
+    `nodes`: parents before children.  `motors`: lower limit, upper limit and home [deg], by name.  `markers`: name, node and normal (3,) of
+    each.  `clauses`: each a list of rows; a row has motor names, their factors and an offset.
+    """
 
     nodes: list[Node] = field(default_factory=list)
     motors: dict[str, tuple[float, float, float]] = field(default_factory=dict)  # low, high, home
@@ -57,7 +70,7 @@ class Program:
 
     @classmethod
     def read(cls, path: Path) -> Program:
-        """Read a file."""
+        """Read a robot file by the rules of 2014."""
         program, root = cls(), ET.fromstring(_first_attributes(path.read_text(encoding="utf-8", errors="replace")))
         program._walk(root, None, "", "", None)
         program._read_clauses(root)
@@ -133,7 +146,7 @@ class Program:
             self.clauses.append(rows)
 
     def poses(self, q: dict[str, float]) -> dict[Node, Array]:
-        """Return the transform (4, 4) of every node at motor positions in [deg]."""
+        """Return the transform (4, 4) of every node, translations in m.  `q`: positions of the motors [deg], by name."""
         placed: dict[Node, Array] = {}
         for node in self.nodes:  # parents come before their children
             carrier = node.parent
@@ -152,7 +165,7 @@ class Program:
         return step
 
     def ignored(self) -> tuple[set[frozenset[Node]], set[frozenset[Node]]]:
-        """Return the pairs of nodes whose solids, and those whose fields, are never tested against each other."""
+        """Return two sets of pairs of nodes that are never tested against each other: for solids, and for fields."""
         solids, fields = set[frozenset[Node]](), set[frozenset[Node]]()
         roots = [node for node in self.nodes if node.parent is None]
 
@@ -180,7 +193,7 @@ class Program:
         return solids, fields
 
     def is_base(self, node: Node) -> bool:
-        """Return whether the volumes of a node are never tested against the world."""
+        """Whether the volumes of a node are never tested against the world."""
         this, found_link, found_joint = node, False, False
         while this.parent is not None:
             if found_link and found_joint and this.is_link != node.is_link:
@@ -193,15 +206,18 @@ class Program:
         return True
 
     def obeys(self, clause: list[tuple[list[str], list[float], float]], q: dict[str, float]) -> bool:
-        """Return whether one row of a clause holds."""
+        """Whether at least one row of a clause holds, that is, the sum of factors times positions plus offset is above 0.
+
+        `q`: positions of the motors [deg], by name.
+        """
         return any(sum(a * q[name] for name, a in zip(names, factors, strict=True)) + b > 0 for names, factors, b in clause)
 
 
 def special_euler(axis: Array, angle: float) -> Array:
-    """Return the rotation that gives a volume its height axis, as the program computed it.
+    """Return the rotation (3, 3) that gives a volume its height axis, as the program of 2014 computed it.
 
-    First a turn about y brings x to the axis' projection on the x-z plane; then the shortest turn brings y to the axis; the last turn, by
-    `angle`, is about the axis.
+    First a rotation about y brings x to the projection of `axis` (3,) on the x-z plane; then the shortest rotation brings y to `axis`; the
+    last rotation, by `angle` [rad], is about `axis`.
     """
     turn = np.eye(3)
     flat = np.array([axis[0], 0.0, axis[2]])
@@ -213,7 +229,10 @@ def special_euler(axis: Array, angle: float) -> Array:
 
 
 def axis_angle(axis: Array, angle: float) -> Array:
-    """Return the rotation about an axis of any length; for length 0 it is cos(angle) times the identity, as in the program."""
+    """Return the rotation (3, 3) by `angle` [rad] about `axis` (3,), which may have any length.
+
+    For length 0 it is cos(angle) times the identity, as in the program of 2014.
+    """
     length = np.linalg.norm(axis)
     x, y, z = axis / length if length > 1e-6 else (0.0, 0.0, 0.0)
     c, s, v = math.cos(angle), math.sin(angle), 1 - math.cos(angle)

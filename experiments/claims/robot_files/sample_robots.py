@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The robots that are measured: of example-robot-data, of pybullet_data, and some of extreme size."""
+"""The robots that `own_robots` measures: of example-robot-data, of pybullet_data, and some of extreme size."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ ROBOTS = (*EXAMPLES, *BULLET, *GENERATED)
 
 
 def examples_folder() -> Path:
-    """Return the folder of example-robot-data; raises InvalidValue if it is not installed."""
+    """Return the folder of robots of the package example-robot-data; raises InvalidValue if it is not installed."""
     for place in sys.path:
         folder = Path(place) / "cmeel.prefix" / "share" / "example-robot-data" / "robots"
         if folder.is_dir():
@@ -95,7 +95,11 @@ def examples_folder() -> Path:
 
 
 def robot_file(name: str, examples: Path, folder: Path) -> Path:
-    """Return the URDF of a robot; a generated one is written into the folder."""
+    """Return the path of the URDF of a robot.
+
+    `name`: one of ROBOTS.  `examples`: folder of example-robot-data.  `folder`: where a generated robot is written.  Raises InvalidValue if
+    pybullet_data is needed and missing.
+    """
     if name in EXAMPLES:
         return examples / EXAMPLES[name]
     if name in BULLET:

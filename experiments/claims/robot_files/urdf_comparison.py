@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Comparison of one URDF file with another reading: Pinocchio's own frames and shapes, and coal's contacts of exact convex hulls."""
+"""Comparison of one URDF file with another reading of it: Pinocchio's frames and shapes, and coal's contacts of exact convex hulls."""
 
 from __future__ import annotations
 
@@ -31,7 +31,14 @@ EMPTY_SRDF = '<robot name="none"/>\n'
 
 @dataclass(frozen=True, slots=True)
 class FileRecord(Row):
-    """The results of one file; measures that are missing are nan, counts -1."""
+    """The results of one URDF file; measurements that are missing are nan, counts -1.
+
+    `outcome`: "loads", "thing" (no robot), "refused" or "crash".  `message`: why it was refused, crashed or not compared.  `links`: number
+    of links with compared frames.  `srdf`: name of the SRDF that was found; `home`: name of the pose in it.  `seconds`: time to load.
+    `frame_error`: largest difference of an element of a link's frame from Pinocchio's.  `contacts`: pairs of links that touch in all poses,
+    by coal; `other`: pairs that touch for one of the two programs only; `deepest_other`: the deepest of these [m].  `at_home`: solid
+    contacts at home; `at_home_without`: the same without an SRDF.
+    """
 
     PLACES = None  # frames differ by 1e-16
 
@@ -52,7 +59,10 @@ class FileRecord(Row):
 
 
 def compare_file(name: str, path: Path, poses: int, seed: int, scratch: Path) -> FileRecord:
-    """Load a file with default options and with exact hulls, and compare; `scratch`: a folder for an empty SRDF."""
+    """Load a URDF file with default options and with exact hulls, and compare it with Pinocchio and coal in random poses.
+
+    `name`: of the file, for the record.  `scratch`: a folder, where an empty SRDF is written.
+    """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
@@ -150,14 +160,14 @@ def _contacts(robot: Robot, owners: list[str], q: Array) -> list[dict[LinkPair, 
 
 
 class PeerFailed(Exception):
-    """Pinocchio or coal cannot read a file that this library has read; the message says why."""
+    """Raised if Pinocchio or coal cannot read a file that this library has read; the message says why."""
 
 
 class UrdfPeer:
-    """The robot of a URDF file as Pinocchio reads it, moved by our motors."""
+    """The robot of a URDF file as Pinocchio reads it; its joints are set to the positions of this library's joints."""
 
     def __init__(self, path: Path, robot: Robot) -> None:
-        """Read the file; raises NotInstalled without Pinocchio, and PeerFailed."""
+        """Read the file.  `robot`: the same file as this library reads it.  Raises NotInstalled without Pinocchio, and PeerFailed."""
         pinocchio = import_peer("pinocchio", "Pinocchio", extra="dev")
         self._pin, self._robot, self._path = pinocchio, robot, path.resolve()
         try:
@@ -189,12 +199,15 @@ class UrdfPeer:
         return q
 
     def frames(self, angles: Array) -> dict[str, Array]:
-        """Return the frame (4, 4) of every link at joint positions (J,)."""
+        """Return the frame (4, 4) of every link, by name.  `angles`: positions of the robot's joints (J,), rad or m."""
         self._pin.framesForwardKinematics(self._model, self._data, self._configuration(angles))
         return {name: self._data.oMf[k].homogeneous for name, k in self._frames.items()}
 
     def read_shapes(self, tested: set[LinkPair]) -> None:
-        """Read the collision geometry, meshes as exact convex hulls; `tested`: the pairs of links whose shapes are tested."""
+        """Read the collision geometry from the file, with meshes as exact convex hulls; raises PeerFailed.
+
+        `tested`: the pairs of links whose shapes are tested.
+        """
         pin, folders = self._pin, [str(folder) for folder in self._path.parents]
         try:
             with contextlib.chdir(self._path.parent):  # where Pinocchio looks for a plain path
@@ -215,7 +228,10 @@ class UrdfPeer:
         make_searches_precise(self._found)
 
     def touching(self, angles: Array) -> dict[LinkPair, float]:
-        """Return the pairs of links that touch at joint positions (J,), and their depths [m]."""
+        """Return the depths [m] of the pairs of links that touch, by pair.  `angles`: positions of the robot's joints (J,), rad or m.
+
+        `read_shapes` must be called before.
+        """
         self._pin.computeCollisions(self._model, self._data, self._geometry, self._found, self._configuration(angles), False)
         found: dict[LinkPair, float] = {}
         for row, result in enumerate(self._found.collisionResults):

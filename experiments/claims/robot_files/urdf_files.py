@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""URDF files of others: whether they load, and whether frames and contacts agree with Pinocchio and coal.
+"""URDF files by other authors: whether they load, and whether frames and contacts agree with Pinocchio and coal.
 
 Claim: a URDF of others loads as it is, or is refused with the line and a remedy; the frames of all links agree with Pinocchio's within
-1e-9, and with exact hulls the pairs of links that touch agree with coal's, in every pose.  Source: none; our own aim (docs/robots.md).
-Run time: about five minutes for 181 files.
+1e-9, and with exact hulls the pairs of links that touch agree with coal's, in every pose.  Source: none; our own aim (docs/robots.md).  Run
+time: about five minutes for 181 files.
 
 Without --folders, the files of icub_models, pybullet_data (without random_urdfs), mujoco and example-robot-data are compared, as far as
-these packages are installed.  The results of each file are on disk before the next; --resume continues after them.  The run's folder then
-holds the table as urdf-files.md.  Pinocchio reads each file by itself, shapes and meshes included.
+these packages are installed.  The results of each file are written before the next file is compared, and --resume continues after them.  At
+the end the table is in the run's folder as urdf-files.md.  Pinocchio reads each file by itself, shapes and meshes included.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ TABLE_HEAD = (
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
+    """Add the command-line options of this experiment to the parser."""
     text = "where to look for *.urdf, as NAME=PATH or PATH (default: packages that are installed)"
     parser.add_argument("--folders", nargs="+", default=[], metavar="DIR", help=text)
     parser.add_argument("--poses", type=positive_whole, default=100, metavar="N", help="random poses of each robot (default: 100)")
@@ -55,7 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Compare every file that is not in the records yet; returns the results."""
+    """Compare every file that is not in the records in `folder` yet, write the table, and return the results of all files."""
     files = dict(_files(named_folders(arguments.folders), arguments.only))
     if not files:
         raise InvalidValue("there is no .urdf file to compare; name folders with --folders DIR, or install icub-models.")
@@ -72,12 +72,16 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 def read_all(path: Path) -> list[FileRecord]:
-    """Return the records of a run."""
+    """Read the records of a run from its CSV file; returns an empty list if there is no file."""
     return [FileRecord.of_record(row) for row in read_records(path, FileRecord.columns())]
 
 
 def results(found: Sequence[FileRecord]) -> dict[str, Any]:
-    """Return the sums of each set of files, and the differences."""
+    """Return the results of all files.
+
+    Keys: "sets", the result of `numbers` for each set of files and for "all"; "refused", "contacts_that_differ" and "not_compared", by
+    file; "passed".
+    """
     sets = {set_name: [one for one in found if one.name.startswith(f"{set_name}/")] for set_name in dict.fromkeys(map(_set_of, found))}
     table = {set_name: numbers(some) for set_name, some in {**sets, "all": list(found)}.items()}
     whole = table["all"]
@@ -93,7 +97,10 @@ def _set_of(one: FileRecord) -> str:
 
 
 def named_folders(given: Sequence[str]) -> dict[str, Path]:
-    """Return the folders by the names of their sets."""
+    """Return the folders in which to look for files, by the name of their set.
+
+    `given`: texts NAME=PATH or PATH; if empty, the installed packages are used.  Raises InvalidValue for a folder that does not exist.
+    """
     if not given:
         return dict(_installed())
     folders: dict[str, Path] = {}
@@ -129,7 +136,10 @@ def _files(folders: dict[str, Path], only: str) -> Iterator[tuple[str, Path]]:
 
 
 def figure(folder: Path) -> Path:
-    """Draw the frame errors, and the contacts at home with and without an SRDF; files are sorted in each panel."""
+    """Draw the frame errors, and the contacts at home with and without an SRDF, to a file in `folder`; returns its path.
+
+    Files are sorted by value in each panel.
+    """
     found, path = read_all(folder / RECORDS), folder / "urdf-files.png"
     loaded = [one for one in found if one.outcome == "loads"]
     drawing = new_figure(9.0, 3.5)
@@ -148,7 +158,7 @@ def figure(folder: Path) -> Path:
 
 
 def numbers(found: Sequence[FileRecord]) -> dict[str, Any]:
-    """Return the sums over some files."""
+    """Return the numbers of files, contacts and differences, summed over the given files."""
     loaded = [one for one in found if one.outcome == "loads"]
     compared = [one for one in loaded if one.contacts >= 0]
     seconds = sorted(one.seconds for one in loaded)
@@ -172,7 +182,10 @@ def numbers(found: Sequence[FileRecord]) -> dict[str, Any]:
 
 
 def write_table(found: Sequence[FileRecord], path: Path) -> None:
-    """Write a line per file: first those that load, then those that are refused, then those without a moving joint."""
+    """Write a Markdown table with a line per file to `path`.
+
+    First come files that load, then those that are refused, then those without a moving joint.
+    """
     loads, refused, without_joints = (
         [one for one in found if one.outcome in kinds] for kinds in (("loads",), ("refused", "crash"), ("thing",))
     )

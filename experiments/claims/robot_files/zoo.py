@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The zoo: whether robots of others become curious without an edit, and how deep they touch themselves while they explore.
+"""The zoo: whether robots by other authors become curious without an edit, and how deep they touch themselves while they explore.
 
 Claim: every robot of five collections loads as it is, gets arms, joints, home, pairs and fields from `mobee.derive`, touches nothing at
-home, touches itself no deeper than 2 mm in ten minutes of curiosity with the derived gains, and its agent tries every action of the
-states that it comes to; or one line says what it cannot do.  Source: aims of this reproduction; the thesis has one robot.
-Published number: none.  Run time: 15 seconds for each robot.
+home, touches itself no deeper than 2 mm in ten minutes of curiosity with the derived gains, and its agent tries every action of the states
+that it comes to; or one line says what it cannot do.  Source: aims of this reproduction; the thesis has one robot.  Published number: none.
+Run time: 15 seconds for each robot.
 
-The collections are icub_models, pybullet_data, example-robot-data (URDF), robosuite and dm_control (MJCF), as far as they are installed,
-or --folders.  All derived arms of a robot learn at once on one offline plant for --minutes of robot time; the true positions of its motors
-are compared with its solids every 0.1 s.  Then the agent of the arm that moves its end farthest learns alone for --actions transitions.
-Robots are on disk one by one; --resume continues.  The figure is a table in Markdown.
+The collections are icub_models, pybullet_data, example-robot-data (URDF), robosuite and dm_control (MJCF), as far as they are installed, or
+--folders.  All derived arms of a robot learn at once on one offline plant for --minutes of robot time; the true positions of its motors are
+compared with its solids every 0.1 s.  Then the agent of the arm that moves its end farthest learns alone for --actions transitions.  The
+results of each robot are written before the next robot is measured, and --resume continues after them.  The figure is a table in Markdown.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ NO_ROBOT = ("no joint moves", "nothing to learn", "the robot has no link")  # in
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
+    """Add the command-line options of this experiment to the parser."""
     text = "where to look for URDF and MJCF files, as NAME=PATH or PATH (default: packages that are installed)"
     parser.add_argument("--folders", nargs="+", default=[], metavar="DIR", help=text)
     parser.add_argument("--only", default="", metavar="TEXT", help="files with this in their path")
@@ -50,7 +50,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Measured(Row):
-    """The measures of one robot; depth in mm, times in s."""
+    """The measurements of one robot.
+
+    `arms`: names of the parts that learn.  `joints`: numbers of their joints.  `errors`, `warnings`: findings of `mobee check` about what
+    was derived.  `at_home`: contacts at home, of solids and fields.  `load_s`, `derive_s`: times to load and to derive [s].  `transitions`:
+    while all arms learn.  `depth_mm`: depth of the deepest solid contact; `touching`: the two solids.  Of the single agent: `tried`,
+    state-actions that it has tried; `can_be_tried`, the actions of all states that it has visited; `state_actions`, all.
+    """
 
     robot: str
     motors: float
@@ -70,7 +76,7 @@ class Measured(Row):
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Measure the robots that are not in the records yet; returns the results."""
+    """Measure the robots that are not in the records in `folder` yet, write the table, and return the results of all."""
     files = dict(robot_files(named_folders(arguments.folders), arguments.only))
     if not files:
         raise InvalidValue("there is no URDF or MJCF file; name folders with --folders DIR, or install icub-models.")
@@ -95,7 +101,10 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 def robot_files(folders: dict[str, Path], only: str) -> Iterator[tuple[str, Path]]:
-    """Yield the name, which is ASCII, and the path of every URDF and MJCF file."""
+    """Yield the name (ASCII) and the path of every URDF and MJCF file in the folders.
+
+    `folders`: by the name of their set.  `only`: text that the name must contain.
+    """
     for name, folder in folders.items():
         for path in sorted((*folder.rglob("*.urdf"), *folder.rglob("*.xml"))):
             label = _ascii(f"{name}/{path.relative_to(folder).as_posix()}")
@@ -108,7 +117,10 @@ def _ascii(text: str) -> str:
 
 
 def measure(name: str, file: Path, minutes: float, actions: int, seed: int) -> Measured:
-    """Measure a robot; raises MobeeError where it cannot be read, or nothing can learn."""
+    """Measure one robot from its file; raises MobeeError if it cannot be read, or if no part of it can learn.
+
+    `minutes`: robot time in which all arms learn.  `actions`: transitions of the single agent.
+    """
     start = time.perf_counter()
     robot = load_robot(file)
     loaded = time.perf_counter()
@@ -137,7 +149,10 @@ def measure(name: str, file: Path, minutes: float, actions: int, seed: int) -> M
 
 
 def babble(derived: Derived, minutes: float, seed: int) -> tuple[int, float, str]:
-    """Let all arms learn at once; returns the number of transitions, the deepest solid contact [m] and the two solids."""
+    """Let all derived arms of a robot learn at once for `minutes` of robot time.
+
+    Returns the number of transitions, the depth of the deepest solid contact [m], and the names of the two solids.
+    """
     plant = OfflinePlant(Model(derived.robot), seed, derived.gains, dt=DT, active=[arm.part for arm in derived.arms])
     solids = Model(replace(derived.robot, field_pairs=derived.robot.field_pairs[:0]))
     deepest = [(0.0, "")]
@@ -154,7 +169,10 @@ def babble(derived: Derived, minutes: float, seed: int) -> tuple[int, float, str
 
 
 def explore(derived: Derived, actions: int, seed: int) -> tuple[CuriousAgent, set[int]]:
-    """Let the arm that moves its end farthest learn alone, until all that can be tried is tried; returns its agent and its states."""
+    """Let the arm that moves its end farthest learn alone, and return its agent and the states that it has visited.
+
+    It ends after `actions` transitions, or when every action of every visited state was tried.
+    """
     arm = max(derived.arms, key=lambda one: one.movement)
     plant = OfflinePlant(Model(derived.robot), seed, derived.gains, dt=DT, active=[arm.part])
     agent = CuriousAgent(derived.space(arm), plant, seed=seed)
@@ -166,17 +184,17 @@ def explore(derived: Derived, actions: int, seed: int) -> tuple[CuriousAgent, se
 
 
 def read(folder: Path) -> list[Measured]:
-    """Return the measured robots of a run."""
+    """Read the measurements of all robots of a run from its folder."""
     return [Measured.of_record(row) for row in read_records(folder / RECORDS, Measured.columns())]
 
 
 def read_refused(folder: Path) -> list[dict[str, str]]:
-    """Return the files that were refused, and why."""
+    """Read which files of a run were refused, as dicts with the keys "robot" and "why"."""
     return read_records(folder / REFUSED, ("robot", "why"))
 
 
 def failures(one: Measured) -> list[str]:
-    """Return in words what a robot cannot do; empty if it meets the claim."""
+    """Return texts that say what a robot cannot do; [] if it meets the claim."""
     judged = {
         f"comes {one.depth_mm:.1f} mm into itself ({one.touching})": one.depth_mm > 1e3 * MAX_DEPTH,
         f"touches itself at home ({one.at_home:.0f} contacts)": one.at_home > 0,
@@ -187,7 +205,11 @@ def failures(one: Measured) -> list[str]:
 
 
 def results(folder: Path) -> dict[str, Any]:
-    """Return the robots that do not meet the claim, with what they cannot do, and the files without a robot."""
+    """Return the results of the run in `folder`.
+
+    Main keys: "robots", their number; "meet the claim"; "cannot", what each other robot cannot do; "refused", why files were refused; "no
+    robots", number of files without a robot; "passed".
+    """
     found, refused = read(folder), read_refused(folder)
     failed = {one.robot: "; ".join(failures(one)) for one in found if failures(one)}
     things = [row["robot"] for row in refused if any(text in row["why"] for text in NO_ROBOT)]
@@ -204,7 +226,7 @@ def results(folder: Path) -> dict[str, Any]:
 
 
 def figure(folder: Path) -> Path:
-    """Write the table, a line per robot, and a line for each file that is refused; returns its path."""
+    """Write a Markdown file with the table of robots and of refused files in `folder`; returns its path."""
     path = folder / TABLE
     refused = [row for row in read_refused(folder) if not any(text in row["why"] for text in NO_ROBOT)]
     lines = [*table(read(folder)), "", "| refused | why |", "|---|---|", *(f"| {row['robot']} | {row['why']} |" for row in refused), ""]
@@ -213,7 +235,7 @@ def figure(folder: Path) -> Path:
 
 
 def table(found: Sequence[Measured]) -> list[str]:
-    """Return the lines of the table in Markdown."""
+    """Return the measurements as the lines of a Markdown table, one robot per line."""
     heads = "robot | motors | arms (joints) | transitions | deepest [mm] | tried of what can be tried | cannot"
     lines = [f"| {heads} |", "|---" * 7 + "|"]
     for one in found:

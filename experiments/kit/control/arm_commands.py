@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Commands for one arm, drawn at random or varied, and runs of the plant in which both arms execute one each."""
+"""Commands for one arm, drawn at random or varied, and runs of the plant in which each arm executes one command."""
 
 from __future__ import annotations
 
@@ -30,7 +30,12 @@ MARGIN = np.deg2rad(15.0)  # rad along the normal, of a start; constraints push 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Command:
-    """A start and three attractors with forces; positions are half ranges from the middle of a range: -1 to 1 inside the limits."""
+    """A command for one arm: a start posture and three phases, each with an attractor and with forces of a client.
+
+    Positions of the 7 motors are in half ranges from the middle of the range: -1 to 1 is inside the limits.  `seconds`: durations of the
+    phases.  `forces`: at the motors, -1 to 1 in units of STRONG (1000 rad/s^2).  `pushes`: at the palm, root frame, -1 to 1 in units of
+    STRONG (1000 N/kg).
+    """
 
     start: Array  # (7,)
     attractors: Array  # (3, 7)
@@ -40,17 +45,20 @@ class Command:
 
     @property
     def is_forced(self) -> bool:
-        """Whether a client pushes in any phase."""
+        """Whether a client exerts forces at the motors or pushes the palm in any phase."""
         return bool(self.forces.any() or self.pushes.any())
 
     @property
     def is_inside(self) -> bool:
-        """Whether all attractors are within the joint limits."""
+        """Whether the attractors of all phases are within the joint limits."""
         return bool(np.all(np.abs(self.attractors) <= 1.0))
 
 
 def random_command(rng: np.random.Generator, forced: bool) -> Command:
-    """Draw a command: half of all commands stay in the joint box, the others leave it with some of the motors."""
+    """Draw a random command: half of all commands have attractors within the joint limits, the others beyond the limits of some motors.
+
+    `forced`: whether a client exerts random forces and pushes.
+    """
     shape = (PHASES, MOTORS)
     inside = rng.uniform(-1.0, 1.0, shape)
     corners = np.where(rng.random(shape) < 0.5, np.sign(inside), inside)
@@ -64,7 +72,7 @@ def random_command(rng: np.random.Generator, forced: bool) -> Command:
 
 
 def vary(rng: np.random.Generator, one: Command, other: Command) -> Command:
-    """Return a command with small changes, and in some cases with phases of another one."""
+    """Return the command `one` with small random changes, and in 30 % of the cases with some phases of the command `other`."""
     step = rng.choice(STEPS)
     take = rng.random(PHASES) < (0.5 if rng.random() < 0.3 else 0.0)
     attractors = np.where(take[:, None], other.attractors, one.attractors)
@@ -85,13 +93,13 @@ def vary(rng: np.random.Generator, one: Command, other: Command) -> Command:
 
 
 def as_numbers(command: Command) -> list[float]:
-    """Return a command as numbers for JSON: start, attractors, seconds, forces, pushes."""
+    """Return a command as a list of numbers for JSON: start, attractors, seconds, forces and pushes, rounded to six decimals."""
     parts = (command.start, command.attractors.ravel(), command.seconds, command.forces.ravel(), command.pushes.ravel())
     return [round(float(x), 6) for x in np.concatenate(parts)]
 
 
 def from_numbers(numbers: list[float]) -> Command:
-    """Return the command with these numbers; inverse of `as_numbers`."""
+    """Return the command that `as_numbers` returned as these numbers."""
     ends = np.cumsum([MOTORS, PHASES * MOTORS, PHASES, PHASES * MOTORS])
     start, attractors, seconds, forces, pushes = np.split(np.array(numbers), ends)
     return Command(start, attractors.reshape(PHASES, -1), seconds, forces.reshape(PHASES, -1), pushes.reshape(PHASES, -1))
@@ -99,7 +107,11 @@ def from_numbers(numbers: list[float]) -> Command:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tried:
-    """Measures of a run in which both arms executed a command."""
+    """Measures of a run in which each arm executed a command; the first row is of the left arm.
+
+    `run`: the recording.  `violations`: (2, clauses of an arm) rad, the largest violation of each clause.  `stop`: (2,) rad/s, the largest
+    speed of a motor at a hard stop.
+    """
 
     run: PlantRun
     violations: Array  # (2, clauses of an arm) rad along the normal, the largest of each
@@ -107,7 +119,10 @@ class Tried:
 
 
 def try_commands(gains: Gains, commands: Sequence[Command], torso: Array, seed: int) -> Tried:
-    """Run a command on each arm while the torso goes to `torso` (3,), in half ranges from its middle."""
+    """Run the iCub at its table with a command for the left arm and one for the right arm, and measure the run.
+
+    `commands`: left, right.  `torso`: (3,) attractor of the torso, in half ranges from the middle of the range.  `seed`: of the plant.
+    """
     robot = icub_at_table().robot
     plant = OfflinePlant(icub_at_table(), seed, gains, dt=PERIOD[gains.law])
     start = robot.home.copy()

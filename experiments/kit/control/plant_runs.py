@@ -23,19 +23,22 @@ REST_TIME = 0.4  # s until motors with a lag of 50 ms are at rest
 
 @lru_cache(maxsize=1)
 def icub() -> Model:
-    """Return the model of the iCub in an empty world."""
+    """Return the model of the iCub in an empty world; every call returns the same object."""
     return Model(load_robot("icub"))
 
 
 @lru_cache(maxsize=1)
 def icub_at_table() -> Model:
-    """Return the model of the iCub at its table."""
+    """Return the model of the iCub at its table; every call returns the same object."""
     return Model(load_robot("icub"), load_world("table"))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlantRun:
-    """A recording of T ticks of a plant; row t is the end of tick t."""
+    """A recording of T ticks of a plant; row t is the end of tick t, counted from 0.
+
+    `q`: (T, n) rad, true joint positions, not encoder readings.  `velocity`: (T, n) rad/s, commanded.  `dt`: s, duration of a tick.
+    """
 
     q: Array  # (T, n) rad, true joint positions, not encoder readings
     velocity: Array  # (T, n) rad/s, commanded
@@ -43,12 +46,12 @@ class PlantRun:
 
     @property
     def times(self) -> Array:
-        """The time of the end of each tick since the beginning of the run, (T,) s."""
+        """The time of the end of each tick, (T,) s, from the beginning of the run."""
         times: Array = self.dt * np.arange(1.0, len(self.q) + 1.0)
         return times
 
     def last(self, seconds: float) -> PlantRun:
-        """Return the last `seconds` of the run."""
+        """Return the recording of the last `seconds` of the run."""
         count = round(seconds / self.dt)
         return PlantRun(self.q[-count:], self.velocity[-count:], self.dt)
 
@@ -56,9 +59,10 @@ class PlantRun:
 def run_plant(
     plant: OfflinePlant, seconds: float, before: Callable[[int], None] | None = None, at: Collection[int] | None = None
 ) -> PlantRun:
-    """Run the plant for `seconds`, at least one tick, and record it.
+    """Run the plant for `seconds`, at least one tick, and return the recording.
 
-    `before` is called with the number of a tick, counted from 0, before each of the ticks `at`; None: before each tick.
+    `before`: function of the number of a tick, counted from 0, that is called before the tick.  `at`: the ticks before which it is called;
+    None: all ticks.
     """
     ticks = max(1, round(seconds / plant.dt))
     calls = () if before is None else range(ticks) if at is None else at
@@ -71,7 +75,10 @@ def run_plant(
 
 
 def place(plant: OfflinePlant, q: Array) -> None:
-    """Put a plant at rest at q (n,) rad with its attractor there; the joints are held until the motors are at rest."""
+    """Put a plant at rest in the posture q (n,) rad, with its attractor there.
+
+    The plant runs for REST_TIME (0.4 s); the joints are held until the motors are at rest.
+    """
     plant.controller.reset(q)
     for _ in range(round(REST_TIME / plant.dt)):
         plant.motors.adopt(q)
@@ -81,7 +88,11 @@ def place(plant: OfflinePlant, q: Array) -> None:
 
 
 def random_posture(robot: Robot, rng: np.random.Generator, motors: Mapping[str, int], within: tuple[float, float]) -> Array:
-    """Draw a posture (n,) rad: the first `motors[part]` motors of each part uniform `within` shares of their range, the others at home."""
+    """Draw a random posture (n,) rad of a robot.
+
+    `motors`: number of motors by part: the first ones of each part are drawn, all other motors are at home.  `within`: lowest and highest
+    share of a motor's range between which its position is drawn uniformly.
+    """
     q = robot.home.copy()
     for part, count in motors.items():
         where = slice(robot.parts[part].start, robot.parts[part].start + count)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Safety measures of recorded postures: violated constraints and limits, depths of contacts, oscillation of a marker.
 
-They share no code with the control law, which they judge.
+The functions share no code with the control law, which they judge.
 """
 
 from __future__ import annotations
@@ -22,26 +22,29 @@ AT_STOP = np.deg2rad(0.01)  # rad; a motor nearer to a limit is at its hard stop
 
 
 def clause_violations(robot: Robot, q: Array) -> Array:
-    """Return the violation of every clause in the postures q (T, n) rad: (T, clauses) rad, above 0 where the clause is violated.
+    """Return the violation of every clause of the robot in postures q (T, n) rad: (T, clauses) rad, above 0 where a clause is violated.
 
-    It is -s / |a| with s = a.q + b; for a clause with several rows, that of the row that is nearest to being satisfied.
+    The violation of a row a.q + b > 0 is -(a.q + b) / |a|; a clause has that of the row that is nearest to being satisfied.
     """
     return np.stack([np.min(-(q @ c.a.T + c.b) / np.linalg.norm(c.a, axis=1), axis=1) for c in robot.clauses], axis=1)
 
 
 def limit_violations(robot: Robot, q: Array) -> Array:
-    """Return the distance of every motor beyond its nearer limit, (T, n) rad, negative inside."""
+    """Return how far every motor is beyond its nearer limit in postures q (T, n) rad: (T, n) rad, negative within the limits."""
     return np.maximum(robot.limits[:, 0] - q, q - robot.limits[:, 1])
 
 
 def speeds_at_stops(robot: Robot, run: PlantRun, start: Array) -> Array:
-    """Return the speeds (T, n) rad/s of the motors in ticks in which they are at a hard stop, else 0; `start`: posture before, (n,) rad."""
+    """Return the speeds (T, n) rad/s of the motors in the ticks in which they are at a hard stop, and 0 in all other ticks.
+
+    `start`: posture before the first tick, (n,) rad.  A motor is at a stop if it is less than AT_STOP (0.01 degrees) from a limit.
+    """
     speeds: Array = np.diff(run.q, axis=0, prepend=start[None]) / run.dt * (limit_violations(robot, run.q) > -AT_STOP)
     return speeds
 
 
 def clause_label(robot: Robot, number: int) -> str:
-    """Return a clause as an inequality in degrees; the prefixes `l_` and `r_` of its motors are left out."""
+    """Return the clause `number` of the robot as text, an inequality in degrees; the prefixes `l_` and `r_` of its motors are left out."""
     rows = []
     for a, b in zip(robot.clauses[number].a, robot.clauses[number].b, strict=True):
         terms = [f"{a[i]:+.3g} {robot.motors[i].split('_', 1)[1]}" for i in np.flatnonzero(a)]
@@ -51,7 +54,11 @@ def clause_label(robot: Robot, number: int) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Depths:
-    """The deepest contacts of a run [m], 0 where there was none."""
+    """The depths of the deepest contacts of a run, m; 0 where there was no contact.
+
+    `solid`: of solid pairs that `is_listed` accepts.  `field`: of fields.  `pair`: names of the shapes of the contact `solid`, "" without
+    one.  `beside`: of all other solid pairs, such as an upper arm beside the pelvis.
+    """
 
     solid: float  # of listed pairs, see `is_listed`
     field: float
@@ -60,7 +67,7 @@ class Depths:
 
 
 def deepest(model: Model, q: Array) -> Depths:
-    """Return the deepest contacts in the postures q (T, n) rad."""
+    """Return the depths of the deepest contacts of the model in the postures q (T, n) rad."""
     table = model.evaluate(q).table
     depth = {True: 0.0, False: 0.0}
     pair = ""
@@ -75,7 +82,10 @@ def deepest(model: Model, q: Array) -> Depths:
 
 
 def oscillation(model: Model, run: PlantRun, marker: str) -> float:
-    """Return the largest distance [m] of a marker from its moving mean over WINDOW; slow motion does not count as oscillation."""
+    """Return the largest distance [m] of a marker from its moving mean over WINDOW (1 s) in a run.
+
+    Slow motion does not count as oscillation.
+    """
     path = model.evaluate(run.q).position(marker)
     window = min(len(path), round(WINDOW / run.dt))
     total = np.concatenate([np.zeros((1, 3)), np.cumsum(path, axis=0)])
@@ -86,9 +96,10 @@ def oscillation(model: Model, run: PlantRun, marker: str) -> float:
 
 @cache
 def is_listed(first: str, second: str) -> bool:
-    """Return whether a solid contact of two shapes is in the simulator's list of pairs; one with an object of the world always is.
+    """Return whether a solid contact of two shapes, given by name, counts as a collision.
 
-    Pairs that overlap in some legal poses, such as upper arms and pelvis, are not listed; their fields exert no force either.
+    It counts if an object of the world takes part, or if the pair of links is in the simulator's list.  Pairs that overlap in some legal
+    poses, such as upper arm and pelvis, are not listed; their fields exert no force either.
     """
     one, other = _link(first), _link(second)
     return one is None or other is None or frozenset((one, other)) in _pairs()

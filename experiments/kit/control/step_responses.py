@@ -26,7 +26,12 @@ MARGIN = np.deg2rad(15.0)  # rad, distance of a posture from every constraint
 
 @dataclass(frozen=True, slots=True)
 class StepResponse:
-    """Measures of a step response."""
+    """Measures of a step response: the largest over the judged joints.
+
+    `settling`: s until the joint stays within 5 % of the step around its end position.  `overshoot`: share of the step.  `error_deg`:
+    degrees between end position and attractor.  `rest_deg`: standard deviation in the last second, degrees.  `is_settled`: whether all
+    joints settled before the last second.
+    """
 
     settling: float  # s
     overshoot: float  # share of the step
@@ -36,7 +41,11 @@ class StepResponse:
 
 
 def motor_step(motor: int) -> tuple[Array, Array]:
-    """Return the postures (n,) rad before and after a step of one motor around the middle of its range, the others at home."""
+    """Return the postures (n,) rad before and after a step of one motor, all other motors at home.
+
+    The step is around the middle of the motor's range; its size is 20 degrees, or a quarter of the range if that is smaller.  `motor`:
+    index in `robot.motors`.
+    """
     robot = icub().robot
     low, high = robot.limits[motor]
     size = min(STEP, SHARE * (high - low))
@@ -46,7 +55,10 @@ def motor_step(motor: int) -> tuple[Array, Array]:
 
 
 def postures(count: int, seed: int) -> list[Array]:
-    """Draw postures (n,) rad of torso and arms, with no field in contact on the paths from home to the first and from one to the next."""
+    """Draw `count` postures (n,) rad of torso and arms, to be taken one after the other, the first from home.
+
+    On the paths to the first posture and from each one to the next, no field is in contact, and all constraints are 15 degrees away.
+    """
     robot, rng = icub().robot, np.random.default_rng(seed)
     found = [robot.home]
     while len(found) <= count:
@@ -63,7 +75,10 @@ def postures(count: int, seed: int) -> list[Array]:
 
 
 def run_step(gains: Gains, period_ms: float, start: Array, end: Array, seed: int) -> PlantRun:
-    """Run a plant from rest at `start` (n,) rad with the attractor at `end`."""
+    """Run a plant from rest at `start` (n,) rad with the attractor at `end` (n,) rad, and return the recording.
+
+    `period_ms`: control period, ms.  `seed`: of the plant.
+    """
     plant = OfflinePlant(icub(), seed, gains, dt=period_ms / 1e3)
     place(plant, start)
     plant.controller.attractor = end
@@ -71,7 +86,10 @@ def run_step(gains: Gains, period_ms: float, start: Array, end: Array, seed: int
 
 
 def step_response(run: PlantRun, start: Array, end: Array) -> StepResponse:
-    """Measure a step response over the joints whose step is at least MIN_STEP."""
+    """Measure the step response in a recording, over the joints whose step is at least MIN_STEP (5 degrees).
+
+    `start`, `end`: postures before and after the step, (n,) rad.
+    """
     moved = np.abs(end - start) >= MIN_STEP
     rest = run.last(REST).q[:, moved]
     final = rest.mean(axis=0)

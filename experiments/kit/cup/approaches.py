@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the trials of the cup experiment share: robot, pre-grasp map and start, and the planner peer with RRT-Connect."""
+"""Common code of the trials of the cup experiment: robot, pre-grasp map and start posture, and a planner that uses RRT-Connect."""
 
 from __future__ import annotations
 
@@ -24,28 +24,31 @@ TRIES = 10  # paths, to find one around what was bumped into
 
 @cache
 def robot() -> Robot:
-    """Return the robot."""
+    """Return the iCub; every call returns the same object."""
     return mobee.load_robot("icub")
 
 
 def side_grasp(model: Model) -> SideGrasp:
-    """Return the grasp of the right hand in a world."""
+    """Return the grasps from the side with the right hand; `model`: the robot in the world that it must not touch."""
     return SideGrasp(model, MARKER, MOTORS, icub_starts(robot()))
 
 
 @cache
 def roadmap() -> Roadmap:
-    """Return the pre-grasp map over the empty table."""
+    """Return the pre-grasp map, a roadmap of poses beside possible places of the cup, made for the empty table."""
     return pre_grasp_map(side_grasp(Model(robot(), table())), TOP)
 
 
 def ready() -> Array:
-    """Return the posture in which a trial begins, (n,) rad: the hand is at the side of the table."""
+    """Return the posture (n,) rad in which a trial begins: the right hand is at the side of the table."""
     return aside(roadmap(), TOP, side_grasp(roadmap().model).grip)
 
 
 def roomy_placement(seed: int) -> Placement:
-    """Draw placements until there is one with room for the hand beside the cup, in some direction and among all clutter."""
+    """Draw placements of cup and clutter with a seed, and return the first one in which the hand fits beside the cup from some direction.
+
+    The start posture must also be without contacts.  All clutter counts, even what the cameras do not see.
+    """
     rng = np.random.default_rng([seed, 433])
     while True:
         scene, world = placement(rng), table()
@@ -57,13 +60,20 @@ def roomy_placement(seed: int) -> Placement:
 
 
 class RrtPlanner:
-    """Calls OMPL's RRT-Connect in a world, and shortens its paths."""
+    """A `mobee.behaviours.pre_grasp.Planner` that uses OMPL's RRT-Connect and shortens the paths.
+
+    `world`: the robot in the world in which it plans.  `seed`: of the random paths.
+    """
 
     def __init__(self, world: Model, seed: int) -> None:
         self._world, self._rng = world, np.random.default_rng([seed, 435])
 
     def path(self, start: Array, goal: Array, azimuth: float, blocked: Array) -> Array | None:
-        """See Planner; a path that passes a blocked place is drawn again, a few times."""
+        """Return a path (K, n) rad from the posture `start` (n,) to the pre-grasp `goal` (n,), or None if no path was found.
+
+        `azimuth` is not used.  `blocked`: (B, 3) m, root frame, positions of the palm at earlier bumps: up to 10 paths are drawn, and the
+        first on which the palm moves around or over these positions is returned.  A path is shortened only if there are none.
+        """
         for _ in range(TRIES if len(blocked) else 1):
             path = rrt_connect(self._world, start, goal, MOTORS, int(self._rng.integers(2**31)))
             if path is None:
@@ -75,7 +85,10 @@ class RrtPlanner:
 
 
 def shortened(world: Model, path: Array, rng: np.random.Generator) -> Array:
-    """Return a path (K, n) rad with shortcuts between random corners where they are free."""
+    """Return the path (K, n) rad with fewer corners: straight motions between random corners replace the path where they are free.
+
+    `world`: the robot in the world that it must not touch.
+    """
     corners = list(path)
     for _ in range(SHORTCUTS):
         if len(corners) < 3:

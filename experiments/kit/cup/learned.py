@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The learned reacher of the cup experiment: on the offline plant it has learned from which postures the palm comes beside a cup."""
+"""The learned reacher of the cup experiment: an agent that learned to bring the palm beside a cup, on the offline plant."""
 
 from __future__ import annotations
 
@@ -25,7 +25,10 @@ SMALL = 0.01  # m, radius of the target, which stands for the place of the palm
 
 @cache
 def learner() -> ReachAgent:
-    """Return the agent, which has learned beside cups at random places of an empty table; torso, wrist and hand are as a trial begins."""
+    """Return the agent, which has learned to reach beside cups at random places of an empty table.
+
+    The four joints of the lattice move; torso, wrist and hand stay in the posture in which a trial begins.
+    """
     body = standing(robot(), ready())
     where = body.part(PART).slice
     low, high = body.limits[where].T
@@ -38,7 +41,10 @@ def learner() -> ReachAgent:
 
 
 def by_learner(plant: PhysicsPlant, thing: Upright) -> Approach:
-    """Bring the palm to the pre-grasp as the agent has learned: along its states, then by a reach; nothing is learned from it."""
+    """Bring the palm beside the cup `thing` as the agent has learned: by a plan along its states, then by a reach.
+
+    The agent learns nothing from this.
+    """
     agent, target = learner(), _target(thing)
     begun = time.process_time()
     state = agent.space.state_of(plant.measure(PART))

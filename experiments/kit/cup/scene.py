@@ -31,7 +31,10 @@ _COLORS = ((0.1, 0.6, 0.15), (0.85, 0.7, 0.1), (0.6, 0.6, 0.65))
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Piece:
-    """A piece of clutter that stands on the table at a place (2,) m; the cameras do not see one that is not `seen`."""
+    """A piece of clutter that stands on the table.
+
+    `place`: (2,) m, root frame, x and y of its centre.  `height`: m.  `seen`: whether the cameras see it.
+    """
 
     shape: Geometry
     place: Array
@@ -41,14 +44,14 @@ class Piece:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placement:
-    """Where the cup stands, (2,) m, and the clutter by name."""
+    """A scene: the place of the cup, (2,) m in the root frame (x and y), and the pieces of clutter by name."""
 
     cup: Array
     clutter: Mapping[str, Piece]
 
 
 def placement(rng: np.random.Generator) -> Placement:
-    """Draw a cup and 0 to 3 pieces of clutter; if there is any, the first piece is one that the cameras do not see."""
+    """Draw a cup and 0 to 3 pieces of clutter at random places; if there is clutter, the cameras do not see the first piece."""
     cup, count = rng.uniform(NEAR, FAR), int(rng.integers(MOST + 1))
     found: dict[str, Piece] = {}
     while len(found) < count:
@@ -63,7 +66,7 @@ def placement(rng: np.random.Generator) -> Placement:
 
 
 def true_world(scene: Placement) -> World:
-    """Return the world of the physics: everything but the table moves when it is pushed."""
+    """Return the world of the physics: table, cup and all clutter; cup and clutter move when they are pushed."""
     world = table()
     world.add(CUP, cylinder(RADIUS, HEIGHT), position=standing(scene.cup, HEIGHT), role="target", color=COLOR, mass=MASS, friction=FRICTION)
     for number, (name, piece) in enumerate(scene.clutter.items()):
@@ -73,29 +76,29 @@ def true_world(scene: Placement) -> World:
 
 
 def table() -> World:
-    """Return the world with the table alone."""
+    """Return a new world with only the table."""
     world = mobee.load_world("table")
     world.remove("ball")
     return world
 
 
 def standing(place: Array, height: float) -> Array:
-    """Return the position (3,) m of the centre of a thing of this height that stands on the table at (2,) m."""
+    """Return the position (3,) m of the centre of a thing that stands on the table; `place`: (2,) m, x and y; `height`: of the thing, m."""
     return np.array([*place, TOP + 0.5 * height])
 
 
 class Eyes:
-    """What the cameras see of the things: their places with noise, and nothing of what is not seen."""
+    """What the cameras see of a scene: the places of the cup and of the visible clutter, with random errors of 2 mm along x and y."""
 
     def __init__(self, scene: Placement, seed: int) -> None:
         self._rng, self._scene = np.random.default_rng([seed, 434]), scene
 
     def cup(self, place: Array) -> Upright:
-        """Return the cup as it is seen when it is at (2,) m."""
+        """Return the cup as the cameras see it, with a new random error, when its true place is `place` (2,) m."""
         return Upright(place + SEEN * self._rng.standard_normal(2), RADIUS, HEIGHT, TOP)
 
     def show(self, world: World, cup: Upright, margin: float) -> None:
-        """Put cup and seen clutter into a world, enlarged by a margin [m], with the role of targets."""
+        """Add the cup, and the clutter that the cameras see, to a world as targets, enlarged by a margin [m]."""
         world.add(CUP, cylinder(RADIUS, HEIGHT).grown(margin), position=standing(cup.place, HEIGHT), role="target")
         for name, piece in self._scene.clutter.items():
             if piece.seen:

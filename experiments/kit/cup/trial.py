@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One trial of the cup experiment: reach the pre-grasp, close the hand, lift the cup and put it down elsewhere, judged in the physics."""
+"""One trial of the cup experiment: reach the pre-grasp, close the hand, lift the cup and put it at another place, judged in the physics."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from mobee.behaviours.pre_grasp import MARKER, WATCHED, Approach, MapPlanner, ap
 from mobee.model.world_object import WorldObject
 
 TORQUES = {"?_*_distal": 0.09, "?_pinky": 0.09, "?_hand_finger": 0.3, "?_thumb_*": 0.3, "?_index_*": 0.3, "?_middle_*": 0.3}
-"""N m, of the motors of the fingers: the robot's file has 40 for all."""
+"""Largest torques of the finger motors, N m, by pattern of motor names; the robot's file has 40 N m for all motors."""
 NEAR, ANGLE = 0.02, float(np.deg2rad(15.0))  # m and rad, of the pre-grasp
 LIFTED, PLACED = 0.05, 0.05  # m: how high the cup must come, and how near to its goal
 UPRIGHT = float(np.deg2rad(10.0))
@@ -41,11 +41,14 @@ GOALS = 24
 
 @dataclass(slots=True)
 class Result:
-    """What a trial measured; m, rad, s.
+    """The measures of a trial, in m, rad and s; -1: not measured, because the trial ended earlier.
 
-    `distance`, `angle`: of the palm from the place beside the true cup, and of its normal from the direction to it; `pre_grasp`: both are
-    small, and nothing was knocked over.  `pushed`: how far a thing was pushed until then, at most.  `lifted`: height; `placed`: distance
-    from the goal; `done`: lifted, and put down upright near its goal.  `why`: where it ended.
+    `distance`: of the palm from its place beside the true cup at the pre-grasp.  `angle`: between the palm's normal and its wanted
+    direction then.  `pushed`: largest distance by which a thing was moved until then.  `knocked`: whether a thing leans more than 25
+    degrees then.  `pre_grasp`: at most 2 cm and 15 degrees, and nothing was knocked over.  `lifted`: height by which the cup was lifted.
+    `placed`: distance of the cup from its goal at the end.  `done`: whether the cup was lifted, and put down upright near its goal, and
+    nothing was knocked over.  `bumps`, `plans`: numbers.  `planning`: processor time.  `clutter`: number of pieces.  `why`: reason of a
+    failure.  `seconds`: simulated time.
     """
 
     pre_grasp: bool = False
@@ -65,7 +68,11 @@ class Result:
 
 
 class Trial:
-    """A scene, the plant in it and what it knows; `run` makes the trial."""
+    """A trial: the scene, the plant with the true world and the world as the cameras see it, and the planner; `run` performs it.
+
+    `method`: "map" (pre-grasp map), "learner" (learned reacher) or "rrt" (RRT-Connect).  `seed`: of the scene, the errors of the cameras
+    and the plant.
+    """
 
     def __init__(self, method: str, seed: int) -> None:
         self.scene: Placement = roomy_placement(seed)
@@ -84,7 +91,7 @@ class Trial:
         self._before = {name: thing.position[:2].copy() for name, thing in self.plant.things.items()}
 
     def run(self) -> Result:
-        """Make the trial."""
+        """Perform the trial and return its measures."""
         self.picker.settle_at(ready())
         found = self._approach()
         result = self.result
@@ -154,10 +161,14 @@ class Trial:
 
 
 def leans(thing: WorldObject) -> float:
-    """Return how far a thing leans, rad."""
+    """Return the angle between a thing's z axis and the vertical, rad."""
     return float(np.arccos(np.clip(thing.rotation[2, 2], -1.0, 1.0)))
 
 
 def run_trial(method: str, seed: int) -> dict[str, object]:
-    """Return the result of a trial as JSON values."""
+    """Perform a trial and return its measures as JSON values, by the names of the fields of `Result`.
+
+    `method`: "map" (pre-grasp map), "learner" (learned reacher) or "rrt" (RRT-Connect).  `seed`: of the scene, the errors of the cameras
+    and the plant.
+    """
     return asdict(Trial(method, seed).run())

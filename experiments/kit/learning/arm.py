@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The published learners: robot, plants, state spaces and agents of thesis chapter 7 and paper section 3, and poses of the left arm.
 
-The robot is `icub_2014` under the gains of 2014, at a control period of 20 ms, its motors those of the plant's defaults
-(docs/plant.md).  Motors that do not take part are rigid at home; those of the arms half-way, as the goals of the actions have them.
+The robot is `icub_2014` under the gains of 2014, with a control period of 20 ms; its motors are the plant's defaults (docs/plant.md).
+Motors that do not take part are rigid: those of the arms in the middle of their range, as in the goals of the actions, all others at home.
 """
 
 from __future__ import annotations
@@ -39,7 +39,10 @@ Neighbours = int | Literal["equidistant"]
 
 @cache
 def robot(free: bool = False) -> Robot:
-    """Return the published robot, with the arms' other motors at home in the middle of their range; `free`: without cable rows."""
+    """Return the published robot; the home of the arms' motors that do not take part is the middle of their range.
+
+    `free`: without clauses, so that no cable constrains the arms.
+    """
     loaded = mobee.load_robot(ROBOT)
     motors = tuple(replace(m, home=float(m.limits.mean())) if _is_idle(m) else m for m in loaded.motor_table)
     return replace(loaded, motor_table=motors, clauses=() if free else loaded.clauses)
@@ -52,16 +55,17 @@ def _is_idle(motor: Motor) -> bool:
 def arm_plant(
     seed: int, free: bool = False, world: World | None = None, gains: Gains | None = None, motors: MotorParameters | None = None
 ) -> OfflinePlant:
-    """Return a plant in which the four motors of the left arm move; `free`: no cable rows, and contacts exert no forces.
+    """Return a plant of the published robot in which only the four motors of the left arm move.
 
-    `gains`, `motors`: replace the published ones.
+    `seed`: of the plant.  `free`: no cable constraints, and contacts exert no forces.  `world`: None: empty.  `gains`, `motors`: replace
+    the published ones; None: the published ones.
     """
     law = Gains.published_2014() if gains is None else gains
     return OfflinePlant(Model(robot(free), world), seed, law, motors, DT, contact_forces=not free, active=LEFT)
 
 
 def table_world(ghost: bool = False) -> World:
-    """Return a world with the table alone, 50 cm thick, top at z = -0.10 m; `ghost`: it exerts no force."""
+    """Return a new world with only the table, 50 cm thick, its top at z = -0.10 m; `ghost`: the table exerts no force."""
     world = mobee.load_world("table")
     world.remove("ball")
     if ghost:
@@ -70,7 +74,11 @@ def table_world(ghost: bool = False) -> World:
 
 
 def table_plant(seed: int, ghost: bool = False, propagate: Literal["tree", "part"] = "tree") -> OfflinePlant:
-    """Return a plant of torso and both arms, eleven motors, at the table; with a ghost table, self-contacts still exert forces."""
+    """Return a plant at the table in which eleven motors move: three of the torso and four of each arm.
+
+    `ghost`: the table exerts no force; self-contacts still exert forces.  `propagate`: which motors a contact force moves: all from the
+    link down to the base ("tree"), or only those of the link's part ("part").
+    """
     law, moving = Gains.published_2014(), (*TORSO, *LEFT, *RIGHT)
     return OfflinePlant(Model(robot(), table_world(ghost)), seed, law, dt=DT, propagate=propagate, active=moving)
 
@@ -78,29 +86,36 @@ def table_plant(seed: int, ghost: bool = False, propagate: Literal["tree", "part
 def arm_space(
     levels: Sequence[float] = RANK3, neighbours: Neighbours = "equidistant", tie_seed: int = 0, joints: Sequence[str] = LEFT
 ) -> Lattice:
-    """Return a lattice over the four joints of an arm."""
+    """Return a lattice over the four joints of an arm.
+
+    `levels`: values of each joint, as shares of its range.  `neighbours`: number of nearest states to which a state has actions, or
+    "equidistant".  `tie_seed`: of the choice among equally near states.  `joints`: names of the joints, by default those of the left arm.
+    """
     return Lattice(robot(), joints, levels, neighbours, tie_seed)
 
 
 def torso_space(tie_seed: int = 0) -> Lattice:
-    """Return the lattice of the torso: 27 states with 8 neighbours each."""
+    """Return the lattice of the torso: 27 states with 8 neighbours each; `tie_seed`: of the choice among equally near states."""
     return Lattice(robot(), TORSO, RANK3, TORSO_NEIGHBOURS, tie_seed)
 
 
 def table_agents(plant: OfflinePlant, explorer: str = "curious", seed: int = 0, tie_seed: int = 0, **settings: Any) -> list[CuriousAgent]:
-    """Return the agents of torso, left arm and right arm; both arms have the same graph.  `settings`: passed to CuriousAgent."""
+    """Return the agents of torso, left arm and right arm of the experiment at the table; both arms have the same graph.
+
+    `explorer`, `seed`, `settings`: passed to `CuriousAgent`.  `tie_seed`: of the choice among equally near states as neighbours.
+    """
     arms = [arm_space(RANK3, ARM_NEIGHBOURS, tie_seed, joints) for joints in (LEFT, RIGHT)]
     return [CuriousAgent(space, plant, explorer, seed, **settings) for space in (torso_space(tie_seed), *arms)]
 
 
 def columns() -> slice:
-    """Return the slice of the left arm's four joints among the robot's motors."""
+    """Return the slice of the left arm's four joints in `robot.motors`, to index poses (..., n)."""
     first = robot().parts[PART].start
     return slice(first, first + JOINTS)
 
 
 def arm_clauses() -> list[Clause]:
-    """Return the clauses of the left shoulder's cables."""
+    """Return the clauses of the left arm, which are the constraints of the shoulder's cables."""
     return [clause for clause in robot().clauses if clause.part == PART]
 
 
@@ -108,14 +123,14 @@ def arm_clauses() -> list[Clause]:
 def min_margin() -> float:
     """Return the smallest distance from a clause at which a pose counts as clear, in units of a.q + b.
 
-    It is half the zone in which the law pushes: there the force moves a resting arm by about three degrees, a quarter of the distance
-    to the edge of a cell of the rank 3 lattice.
+    The distance is half the zone in which the law pushes.  There the force moves a resting arm by about three degrees, a quarter of the
+    distance to the edge of a cell of the rank 3 lattice.
     """
     return Gains.published_2014().constraint_width / 2.0
 
 
 def whole(q: Array) -> Array:
-    """Return poses of the four joints (..., 4) as poses of the robot (..., n), the other motors at home; rad."""
+    """Return the poses (..., n) rad of the robot with the left arm's four joints at q (..., 4) rad and all other motors at home."""
     body = robot()
     poses = np.broadcast_to(body.home, (*q.shape[:-1], len(body.home))).copy()
     poses[..., columns()] = q
@@ -123,7 +138,10 @@ def whole(q: Array) -> Array:
 
 
 def clear(model: Model, q: Array, clauses: Sequence[Clause]) -> NDArray[np.bool_]:
-    """Return (P,) whether in each pose (P, 4) rad no field is in contact and all clauses are farther than `min_margin`."""
+    """Return for each pose q (P, 4) rad of the left arm whether no field is in contact and all clauses are farther than `min_margin`, (P,).
+
+    `model`: the robot in its world.  `clauses`: the constraints that count.
+    """
     poses = whole(q)
     good = np.ones(len(poses), dtype=bool)
     good[model.evaluate(poses).table.pose] = False

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Roadmaps of the published left arm, and planners that are compared with each other.
 
-Vertices and edges of a roadmap are free poses and motions in the model that a planner believes in; the graph is OMPL's PRM or the lattice
-of the learners.  The planners are straight motions, a roadmap planned once or replanned, and a learned MDP.
+Vertices and edges of a roadmap are poses and motions that are free in the model that a planner believes in; the graph is OMPL's PRM or the
+lattice of the learners.  The planners are: straight motions, a roadmap planned once, a roadmap replanned after failures, and a learned MDP.
 """
 
 from __future__ import annotations
@@ -34,41 +34,45 @@ Edge = tuple[int, int]  # vertices, the smaller first
 class Belief:
     """A planner's model of robot and world; a pose of the arm is sound if it is clear of contacts and cable constraints.
 
-    It is a `mobee.roadmap.ompl.ValidityChecker`.
+    The class implements `mobee.roadmap.ompl.ValidityChecker`.
 
     Args:
-        model: the robot in the world, as believed.
+        model: the robot in the world, as the planner believes it to be.
         turns: (4,) rad, believed minus measured joint angles.
-        clauses: the known constraints of the cables.
+        clauses: the constraints of the cables that the planner knows.
     """
 
     def __init__(self, model: Model, turns: Array, clauses: Sequence[Clause]) -> None:
         self._model, self._turns, self._clauses = model, turns, clauses
         limits = robot().limits[columns()]
         self.box: Array = limits + np.array([1.0, -1.0]) * Gains.published_2014().limit_width
-        """(4, 2) rad between which the joint limits exert no force."""
+        """(4, 2) rad, lowest and highest angles between which the joint limits exert no force."""
         self.low: Array = self.box[:, 0]
         self.span: Array = np.ptp(limits, axis=1)
-        """(4,) rad, the joints' ranges."""
+        """(4,) rad, widths of the joints' ranges."""
         self.checked = 0
-        """Number of poses that were checked."""
+        """Number of poses that were checked so far."""
 
     def sound(self, q: Array, cables: bool = True) -> NDArray[np.bool_]:
-        """Return which of the poses (P, 4) rad are sound, (P,); `cables`: whether cable constraints count."""
+        """Return which of the poses (P, 4) rad of the arm are sound, (P,); `cables`: whether the cable constraints count."""
         self.checked += len(q)
         return clear(self._model, q + self._turns, self._clauses if cables else ())
 
     def sound_motion(self, start: Array, end: Array, cables: bool = True) -> bool:
-        """Return whether the straight motion between two poses (4,) rad is sound; its start is not checked."""
+        """Return whether the straight motion between two poses (4,) rad is sound; the start pose is not checked.
+
+        `cables`: whether the cable constraints count.
+        """
         count = max(1, int(np.ceil(np.abs((end - start) / self.span).max() / STEP)))
         shares = np.arange(1, count + 1)[:, None] / count
         return bool(self.sound(start + shares * (end - start), cables).all())
 
 
 class Roadmap:
-    """An undirected graph of V vertices, poses of the arm (V, 4) rad.
+    """An undirected graph of V vertices, which are poses of the arm (V, 4) rad.
 
-    The cost of a motion is 1, for the action, plus its length in fractions of the joints' ranges.
+    The cost of a motion is 1, for the action, plus the length of the motion in fractions of the joints' ranges.  `belief`: the model in
+    which motions are checked when vertices are added or a pose is joined to the graph.
     """
 
     def __init__(self, vertices: Array, edges: Iterable[Edge], belief: Belief) -> None:
@@ -81,16 +85,16 @@ class Roadmap:
 
     @property
     def edges(self) -> int:
-        """Number of edges."""
+        """The number of edges."""
         return sum(len(costs) for costs in self._costs) // 2
 
     def pose(self, vertex: int) -> Array:
-        """Return the pose of a vertex, (4,) rad."""
+        """Return the pose (4,) rad of a vertex, given by its number."""
         pose: Array = self.vertices[vertex]
         return pose
 
     def add(self, pose: Array, neighbours: int) -> int:
-        """Add a vertex, with edges to and from the nearest vertices that are `reachable`; return its number."""
+        """Add a pose (4,) rad as a vertex, with edges to the vertices that `reachable` returns for `neighbours`; returns its number."""
         joined = self.reachable(pose, neighbours)
         self.vertices = np.concatenate([self.vertices, pose[None]])
         self._costs.append({})
@@ -99,13 +103,13 @@ class Roadmap:
         return len(self.vertices) - 1
 
     def nearest(self, pose: Array, count: int) -> list[int]:
-        """Return the `count` vertices nearest to a pose; distances are fractions of the joints' ranges."""
+        """Return the numbers of the `count` vertices nearest to a pose (4,) rad; distances are in fractions of the joints' ranges."""
         return [int(v) for v in np.argsort(self._lengths(pose), kind="stable")[:count]]
 
     def reachable(self, pose: Array, neighbours: int) -> list[int]:
-        """Return those of the nearest vertices to which the straight motion is sound.
+        """Return which of the nearest vertices (`neighbours` of them) can be reached from a pose (4,) rad by a sound straight motion.
 
-        If there is none, ignore the cable constraints; if there is still none, return all nearest ones.
+        If there is none, the cable constraints are ignored; if there is still none, all these nearest vertices are returned.
         """
         near = self.nearest(pose, neighbours)
         for cables in (True, False):  # a pose that violates the cable constraints may still be reached
@@ -115,7 +119,10 @@ class Roadmap:
         return near
 
     def path(self, starts: dict[int, float], goal: int, blocked: Collection[Edge]) -> list[int] | None:
-        """Return the vertices of the cheapest path from one of the starts (with the cost to reach it) to the goal; None without a path."""
+        """Return the vertices of the cheapest path to the vertex `goal`, its start included; None if there is no path.
+
+        `starts`: vertices from which the path may start, each with the cost to reach it.  `blocked`: edges that must not be used.
+        """
         best, before = dict(starts), dict.fromkeys(starts, -1)
         queue = [(cost, vertex) for vertex, cost in starts.items()]
         heapq.heapify(queue)
@@ -135,7 +142,7 @@ class Roadmap:
         return None
 
     def cost(self, pose: Array, vertex: int) -> float:
-        """Return the cost of the motion from a pose to a vertex."""
+        """Return the cost of the straight motion from a pose (4,) rad to a vertex: 1 plus its length in fractions of the joints' ranges."""
         return 1.0 + float(np.linalg.norm((self.vertices[vertex] - pose) / self.belief.span))
 
     def _lengths(self, pose: Array) -> Array:
@@ -148,12 +155,15 @@ class Roadmap:
 
 
 def edge(first: int, second: int) -> Edge:
-    """Return the undirected edge between two vertices."""
+    """Return the undirected edge between two vertices: a pair with the smaller number first."""
     return (first, second) if first < second else (second, first)
 
 
 def make_roadmap(kind: str, belief: Belief, lattice: Lattice, seed: int) -> Roadmap:
-    """Build a roadmap of one of the KINDS, all motions of which are sound in the planner's model."""
+    """Build a roadmap of which all motions are sound in the planner's model.
+
+    `kind`: "OMPL": a PRM with 300 vertices; "lattice": the sound samples and actions of the lattice.  `seed`: of the PRM.
+    """
     if kind == "OMPL":
         return ompl_roadmap(belief, MILESTONES, NEIGHBOURS, seed)
     samples = np.flatnonzero(belief.sound(lattice.samples))
@@ -164,7 +174,7 @@ def make_roadmap(kind: str, belief: Belief, lattice: Lattice, seed: int) -> Road
 
 
 def with_goals(roadmap: Roadmap, lattice: Lattice, goals: Ints) -> dict[int, int]:
-    """Add the samples of goal states that are not vertices yet; returns the vertex of each state."""
+    """Add the samples of the states `goals` to the roadmap, where it has no vertex yet; returns the number of the vertex by state."""
     found = {}
     for state in sorted({int(goal) for goal in goals}):
         sample = lattice.samples[state]
@@ -174,29 +184,32 @@ def with_goals(roadmap: Roadmap, lattice: Lattice, goals: Ints) -> dict[int, int
 
 
 def ompl_roadmap(belief: Belief, milestones: int, neighbours: int, seed: int) -> Roadmap:
-    """Build a PRM over the arm's four joints by OMPL, in fractions of their ranges; raises OmplMissing."""
+    """Build a PRM over the arm's four joints with OMPL; distances are in fractions of the joints' ranges.  Raises OmplMissing.
+
+    `milestones`: number of vertices.  `neighbours`: number of nearest vertices to which each vertex is joined if the motion is sound.
+    """
     found = grown("PRM", belief, milestones, neighbours, seed, resolution=STEP)
     return Roadmap(found.q, [(v, w) for v, w in found.edges.tolist()], belief)
 
 
 class Rival(Protocol):
-    """A planner that chooses the next pose to go to, and observes the outcome."""
+    """A planner in a comparison: it chooses the next pose of the arm, and observes the outcome of the motion."""
 
     repairs: int
-    """Number of actions so far that did not end as planned."""
+    """Number of actions so far that did not end as the planner expected."""
 
     def begin(self, goal: int) -> None:
-        """Begin a new query for a goal state of the lattice."""
+        """Start a new query: reach the cell of the lattice state `goal`."""
 
     def aim(self, q: Array) -> Array | None:
-        """Return the pose (4,) rad to go to from q; None: the planner gives up."""
+        """Return the pose (4,) rad to which the arm moves next from the pose q (4,) rad; None: the planner gives up."""
 
     def observe(self, start: Array, end: Array) -> None:
         """Observe the poses (4,) rad in which the last motion started and ended."""
 
 
 class Straight:
-    """Goes straight to the goal, repeatedly."""
+    """A `Rival` that moves straight to the sample of the goal state, again and again."""
 
     repairs = 0
 
@@ -204,20 +217,23 @@ class Straight:
         self._space, self._goal = space, 0
 
     def begin(self, goal: int) -> None:
-        """See Rival."""
+        """Start a query for the state `goal`, as in `Rival.begin`."""
         self._goal = goal
 
     def aim(self, q: Array) -> Array | None:
-        """See Rival."""
+        """Return the sample of the goal state, (4,) rad, whatever q is, as in `Rival.aim`."""
         sample: Array = self._space.samples[self._goal]
         return sample
 
     def observe(self, start: Array, end: Array) -> None:
-        """See Rival."""
+        """Do nothing: this planner learns nothing from the outcomes of motions (`Rival.observe`)."""
 
 
 class PlannedOnce:
-    """Plans one path through a roadmap and sends the robot to its vertices, wherever the motions end: plan first, act later."""
+    """A `Rival` that plans one path through a roadmap and moves to its vertices one after the other, wherever the motions end.
+
+    `vertex_of`: number of the vertex of each goal state.  `neighbours`: number of near vertices at which the path may start.
+    """
 
     repairs = 0
 
@@ -227,11 +243,11 @@ class PlannedOnce:
         self._left: Iterator[int] | None = None
 
     def begin(self, goal: int) -> None:
-        """See Rival."""
+        """Start a query for the state `goal`, as in `Rival.begin`; the path is planned at the first call of `aim`."""
         self._goal, self._left = self._vertex_of[goal], None
 
     def aim(self, q: Array) -> Array | None:
-        """See Rival."""
+        """Return the pose (4,) rad of the next vertex of the path; None after the last vertex, or without a path, as in `Rival.aim`."""
         if self._left is None:
             near = self._roadmap.reachable(q, self._neighbours)
             path = self._roadmap.path({v: self._roadmap.cost(q, v) for v in near}, self._goal, ())
@@ -240,16 +256,16 @@ class PlannedOnce:
         return None if vertex is None else self._roadmap.pose(vertex)
 
     def observe(self, start: Array, end: Array) -> None:
-        """See Rival."""
+        """Do nothing: this planner does not react to the outcomes of motions (`Rival.observe`)."""
 
 
 class Repaired:
-    """Follows the cheapest path through a roadmap; a motion that fails is removed, and the path is planned again (thesis 4.2).
+    """A `Rival` that follows the cheapest path through a roadmap; a motion that fails is removed, and a new path planned (thesis 4.2).
 
     Args:
         roadmap: the roadmap, which is not changed.
-        vertex_of: the vertex of each goal state.
-        neighbours: number of near vertices to which it may return after it was pushed off the roadmap.
+        vertex_of: number of the vertex of each goal state.
+        neighbours: number of near vertices to which the arm may return after it was pushed off the roadmap.
         remembers: whether removed motions stay removed in the next query.
     """
 
@@ -261,13 +277,16 @@ class Repaired:
         self.repairs = 0
 
     def begin(self, goal: int) -> None:
-        """See Rival."""
+        """Start a query for the state `goal`, as in `Rival.begin`; without memory, all removed motions are available again."""
         self._goal, self._at = self._vertex_of[goal], None
         if not self._remembers:
             self._out.clear()
 
     def aim(self, q: Array) -> Array | None:
-        """See Rival."""
+        """Return the pose (4,) rad of the next vertex of the cheapest path from q (4,) rad, as in `Rival.aim`; None if there is no path.
+
+        If the removed motions leave no path, all of them become available again.
+        """
         path = self._path(q)
         if not path:  # too many motions were removed: some fail only sometimes
             self._out.clear()
@@ -278,7 +297,7 @@ class Repaired:
         return self._roadmap.pose(self._to)
 
     def observe(self, start: Array, end: Array) -> None:
-        """See Rival."""
+        """Remove the last motion if it ended away from its vertex, by more than 1/8 of a joint's range, as in `Rival.observe`."""
         off = np.abs((end - self._roadmap.pose(self._to)) / self._roadmap.belief.span)
         if off.max() <= ARRIVED:
             self._at = self._to
@@ -302,7 +321,7 @@ class Repaired:
 
 
 class Learned:
-    """Follows the plan of a learned transition model, which is updated and planned with after every action."""
+    """A `Rival` that follows the plan of a learned transition model; after every action the model is updated, and a new plan is made."""
 
     def __init__(self, space: Lattice, model: TransitionModel) -> None:
         self._space, self._model = space, model
@@ -310,18 +329,18 @@ class Learned:
         self.repairs = 0
 
     def begin(self, goal: int) -> None:
-        """See Rival."""
+        """Start a query for the state `goal`, as in `Rival.begin`."""
         self._goal = goal
 
     def aim(self, q: Array) -> Array | None:
-        """See Rival."""
+        """Return the sample (4,) rad of the goal of the planned action in the state of q (4,) rad, as in `Rival.aim`."""
         state = self._space.state_of(q)
         self._action = int(Planner(self._space, self._model.debiased(), [self._goal]).policy[state])
         sample: Array = self._space.samples[self._space.goal(state, self._action)]
         return sample
 
     def observe(self, start: Array, end: Array) -> None:
-        """See Rival."""
+        """Observe the transition from the state of `start` to the state of `end`, poses (4,) rad, with the model, as in `Rival.observe`."""
         before, after = self._space.state_of(start), self._space.state_of(end)
         self.repairs += after != self._space.goal(before, self._action)
         self._model.observe(before, self._action, after)

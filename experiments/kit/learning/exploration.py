@@ -16,26 +16,32 @@ from mobee.store import Transition
 
 
 def begin_anywhere(space: Space, plant: OfflinePlant, seed: int) -> None:
-    """Move the part into a random state, as at the beginning of the published runs; the motion is not observed."""
+    """Move the part of the space towards a random state, as at the beginning of the published runs; no agent observes this motion."""
     plant.act(space.part, space.target(int(np.random.default_rng(seed).integers(len(space)))))
 
 
 def begin_nearby(space: Space, plant: Plant, seed: int) -> int:
-    """Move the part to a random neighbour of its state and return the new state; not observed, as the motion starts at no sample."""
+    """Move the part of the space to a random neighbour of its state, and return the number of the state that was reached.
+
+    No agent observes this motion, because it does not start at a sample.
+    """
     state = space.state_of(plant.measure(space.part))
     goal = int(np.random.default_rng(seed).choice(space.actions(state)))
     return space.state_of(plant.act(space.part, space.target(goal)).q)
 
 
 def newest(agent: CuriousAgent) -> Transition:
-    """Return the last transition of an agent; raises MobeeError if it has none."""
+    """Return the last transition of an agent; raises MobeeError if it has made none."""
     if agent.last is None:
         raise MobeeError(f"the agent of {agent.part} has observed nothing yet: let it make a step first.")
     return agent.last
 
 
 def explore(agent: CuriousAgent, most: int, enough: Callable[[CuriousAgent], bool] = lambda agent: False) -> Ints:
-    """Make up to `most` transitions, until `enough(agent)` is true; returns (T, 3): state, action, state reached."""
+    """Let an agent make up to `most` transitions, and return them, (T, 3): state, action, state reached.
+
+    `enough`: function of the agent that is called before each transition; the agent stops when it returns True.
+    """
     seen: list[tuple[int, int, int]] = []
     while len(seen) < most and not enough(agent):
         agent.step()
@@ -45,13 +51,16 @@ def explore(agent: CuriousAgent, most: int, enough: Callable[[CuriousAgent], boo
 
 
 class LeastTries:
-    """Stopping criterion: every state-action was tried at least `least` times; counts incrementally."""
+    """A stopping criterion for `explore`: every state-action was tried at least `least` times.
+
+    `state_actions`: number of state-actions.  The tries are counted incrementally, so it must be called after every transition.
+    """
 
     def __init__(self, least: int, state_actions: int) -> None:
         self._least, self._left = least, state_actions
 
     def __call__(self, agent: CuriousAgent) -> bool:
-        """Return whether the criterion is met; must be called after every transition."""
+        """Return whether the criterion is met; must be called after every transition of the agent."""
         if agent.last is not None and agent.model.tries[agent.last.s, agent.last.a] == self._least:
             self._left -= 1
         return self._left == 0
@@ -59,7 +68,11 @@ class LeastTries:
 
 @dataclass(eq=False)
 class Log:
-    """The transitions of one part; `poses`: positions of all motors at the end of each transition, (n,) rad each."""
+    """The T transitions of one part, as lists of length T.
+
+    `seen`: state, action, state reached.  `settled`: whether the action settled.  `durations`: s.  `ends`: plant time, s.  `touched`: names
+    of the world objects in contact at the end.  `poses`: positions of all motors at the end, (n,) rad.
+    """
 
     seen: list[tuple[int, int, int]] = field(default_factory=list)
     settled: list[bool] = field(default_factory=list)
@@ -69,7 +82,7 @@ class Log:
     poses: list[Array] = field(default_factory=list)
 
     def arrays(self, part: str, count: int) -> dict[str, Any]:
-        """Return the first `count` transitions without poses as arrays for a cell; their names end in the name of the part."""
+        """Return seen, settled, durations and ends of the first `count` transitions as arrays, by keys such as "seen_left_arm"."""
         return {
             f"seen_{part}": np.array(self.seen[:count], dtype=np.uint16),
             f"settled_{part}": np.array(self.settled[:count], dtype=bool),
@@ -79,7 +92,10 @@ class Log:
 
 
 def explore_together(agents: Sequence[CuriousAgent], plant: OfflinePlant, transitions: int) -> dict[str, Log]:
-    """Act as `mobee.run` does until every agent has made that many transitions; faster agents continue in the meantime."""
+    """Let several agents act at the same time on one plant, as `mobee.run` does, and return the transitions by part.
+
+    The run ends when every agent has made `transitions` transitions; faster agents make more in the meantime.
+    """
     logs = {agent.part: Log() for agent in agents}
     by_part, waiting = {agent.part: agent for agent in agents}, list(agents)
     while min(len(log.seen) for log in logs.values()) < transitions:

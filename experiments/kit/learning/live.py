@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Equal agents on the offline plant and on the live processes in lockstep, and the distances between their outcomes.
 
-Finished transitions are on disk.  A distance is the total variation of the outcomes of a state-action.
+The transitions are stored on disk as soon as they are made.  The distance of two records is the total variation of the outcomes of a
+state-action.
 """
 
 from __future__ import annotations
@@ -67,14 +68,17 @@ transitions = {transitions}
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """The parts that learn, each with its number of actions per state, and their world."""
+    """A learning task.
+
+    `world`: name or path of the world.  `neighbours`: number of actions of each state, by name of the part that learns.
+    """
 
     world: str
     neighbours: Mapping[str, int]
 
     @property
     def parts(self) -> tuple[str, ...]:
-        """The parts that learn."""
+        """The names of the parts that learn."""
         return tuple(self.neighbours)
 
 
@@ -86,23 +90,27 @@ TASKS = {
 
 
 def space(robot: Robot, task: Task, part: str) -> Lattice:
-    """Return the lattice of rank 3 of a part."""
+    """Return the lattice of a part, with three values of each joint (rank 3) and as many neighbours as the task states."""
     return Lattice(robot, JOINTS[part], neighbours=task.neighbours[part])
 
 
 def offline_plant(task: Task, seed: int) -> OfflinePlant:
-    """Return a plant of the whole robot, with the motors that were identified on PyBullet."""
+    """Return a plant of the whole iCub in the world of the task, with the motor model that was identified on PyBullet."""
     model = Model(load_robot(ROBOT), load_world(task.world))
     return OfflinePlant(model, seed, Gains.named(GAINS), MotorParameters.identified(ROBOT), 1.0 / RATE)
 
 
 def agents(task: Task, plant: Plant, seed: int) -> list[CuriousAgent]:
-    """Return an agent for each part, with the settings of services.agents."""
+    """Return an agent for each part of the task, with the settings that the agents of the live system (`services.agents`) have."""
     return [CuriousAgent(space(plant.robot, task, part), plant, seed=seed) for part in task.parts]
 
 
 def learn_offline(cell: Cell) -> dict[str, Any]:
-    """Learn offline in a cell with the settings `task` and `transitions`; returns the transitions of each part, (T, 3)."""
+    """Learn on the offline plant; the settings of the cell are `task` (name of a task) and `transitions` (number for each part).
+
+    Returns for each part "seen_<part>": transitions (T, 3): state, action, state reached; and "touched_<part>": (T,), whether each ended in
+    contact with an object of the world.
+    """
     task, number = TASKS[cell.settings["task"]], cell.settings["transitions"]
     plant = offline_plant(task, cell.seed)
     logs = explore_together(agents(task, plant, cell.seed), plant, number)
@@ -111,10 +119,19 @@ def learn_offline(cell: Cell) -> dict[str, Any]:
 
 
 def learn_live(task: str, robot: str, seed: int, transitions: int, folder: Path, report: Callable[[int], None], piece: int = PIECE) -> None:
-    """Let every part of a task make that many transitions on one of the ROBOTS; continues an interrupted call.
+    """Let every part of a task make `transitions` transitions on a live robot; continues after an interrupted call.
 
-    `report`: called before each launch of `piece` transitions per part with the number that the slowest part has made.
-    Raises LaunchFailed.
+    Args:
+        task: name of the task: "arms", "table" or "published".
+        robot: simulator of the robot: "pybullet", "mujoco" or "kinematic".
+        seed: of the agents, the robot and its encoders.
+        transitions: number for each part.
+        folder: where the transitions, the scenario and the launches are stored.
+        report: function that is called before each launch, with the number of transitions that the slowest part has made.
+        piece: number of transitions of each part in one launch.
+
+    Raises:
+        LaunchFailed: a launch failed, or three launches in a row made no transition.
     """
     folder.mkdir(parents=True, exist_ok=True)
     idle = 0
@@ -131,7 +148,7 @@ def learn_live(task: str, robot: str, seed: int, transitions: int, folder: Path,
 
 
 def observed(folder: Path, task: str, number: int) -> dict[str, Any]:
-    """Return the first `number` transitions of each part that were learned live, as `learn_offline` returns them."""
+    """Return the first `number` transitions of each part that `learn_live` stored in `folder`, in the form that `learn_offline` returns."""
     values: dict[str, Any] = {}
     for part in TASKS[task].parts:
         with TransitionStore(folder / STORE, part, read_only=True) as store:
@@ -169,38 +186,41 @@ Counts = Mapping[str, Ints]  # by part: number of each outcome, (S, A, S)
 
 @dataclass(frozen=True, slots=True)
 class Distance:
-    """Distance of two records over the state-actions that both have tried often enough."""
+    """The distance of two records of transitions, over the state-actions that both records tried often enough."""
 
     variation: float
-    """Mean total variation of a state-action, 0 to 1."""
+    """Mean over the compared state-actions of the total variation between their outcomes in both records, 0 to 1."""
     agree: float
-    """Share of state-actions with the same most frequent outcome."""
+    """Share of the compared state-actions that have the same most frequent outcome in both records."""
     compared: int
-    """Number of compared state-actions."""
+    """Number of compared state-actions: those that both records tried often enough."""
 
 
 def counts_of(seen: Ints, space: Lattice) -> Ints:
-    """Count the outcomes, (S, A, S), of transitions (T, 3): state, action, state reached."""
+    """Count the outcomes in transitions `seen` (T, 3), rows of state, action, state reached; returns (S, A, S)."""
     counts = np.zeros((*space.goals.shape, len(space)), dtype=np.intp)
     np.add.at(counts, tuple(np.asarray(seen, dtype=np.intp).T), 1)
     return counts
 
 
 def variations(first: Ints, second: Ints, least: int) -> Array:
-    """Return the total variation (S, A) between two tables of counts (S, A, S); NaN where one has fewer than `least` tries."""
+    """Return the total variation (S, A) of the outcomes in two tables of counts (S, A, S); NaN where one has fewer than `least` tries."""
     both = (first.sum(axis=-1) >= least) & (second.sum(axis=-1) >= least)
     apart: Array = np.where(both, 0.5 * np.abs(shares(first) - shares(second)).sum(axis=-1), np.nan)
     return apart
 
 
 def shares(counts: Ints) -> Array:
-    """Return the share of each outcome in the tries of its state-action, (S, A, S); 0 without tries."""
+    """Return the share of each outcome in the tries of its state-action, (S, A, S), from counts (S, A, S); 0 without tries."""
     found: Array = counts / np.maximum(counts.sum(axis=-1, keepdims=True), 1)
     return found
 
 
 def distance(first: Counts, second: Counts, least: int) -> Distance:
-    """Return the distance between two records of the same parts, over all their state-actions."""
+    """Return the distance between two records, over the state-actions of all parts that both tried at least `least` times.
+
+    `first`, `second`: counts of outcomes (S, A, S) by part.  Without such state-actions the numbers are NaN.
+    """
     apart = np.concatenate([variations(first[part], second[part], least).ravel() for part in first])
     same = np.concatenate([(first[part].argmax(axis=-1) == second[part].argmax(axis=-1)).ravel() for part in first])
     both = np.isfinite(apart)
@@ -210,7 +230,7 @@ def distance(first: Counts, second: Counts, least: int) -> Distance:
 
 
 def mean(distances: Sequence[Distance]) -> Distance:
-    """Return the mean of several distances."""
+    """Return the mean of each number of several distances; the mean of `compared` is rounded."""
     rows = np.array([(one.variation, one.agree, one.compared) for one in distances])
     variation, agree, compared = rows.mean(axis=0)
     return Distance(float(variation), float(agree), round(float(compared)))
@@ -218,22 +238,23 @@ def mean(distances: Sequence[Distance]) -> Distance:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Compared:
-    """Distances of the live robots and the offline seeds of a task.
+    """The distances of the live robots, and of the offline runs with different seeds, of a task.
 
-    An offline seed is compared with all other offline seeds together; a live robot with all offline seeds but one, averaged over
-    the seed left out.
+    `live`: by robot: the mean of its distances from all offline runs but one, over the omitted run.  `offline`: for each offline run, its
+    distance from all other offline runs together.
     """
 
     live: dict[str, Distance]
     offline: tuple[Distance, ...]
     counts: dict[str, Counts]
-    """The counts of each live robot, and of all offline seeds together under "offline"."""
+    """Counts of outcomes (S, A, S), by robot and part; under "offline" those of all offline runs together."""
 
 
 def compared(folder: Path, task: str, least: int) -> Compared:
-    """Compare the outcomes that the live robots and the offline seeds of a run recorded for a task.
+    """Compare the outcomes that the live robots and the offline runs recorded for a task in the folder of an experiment's run.
 
-    `folder` is the folder of the run.  Raises InvalidValue if fewer than two offline seeds have finished.
+    `task`: "arms", "table" or "published".  `least`: tries that a state-action must have in both records.  Raises InvalidValue if fewer
+    than two offline runs have finished.
     """
     results = [r for r in load_cells(folder).values() if r.cell.settings["task"] == task]
     if len(results) < 2:
@@ -259,7 +280,11 @@ def compared(folder: Path, task: str, least: int) -> Compared:
 
 @dataclass(frozen=True, slots=True)
 class Contacts:
-    """Counts of a part's actions: those that missed their goals, those that ended in contact with an object, both, and all."""
+    """Numbers of a part's actions.
+
+    `missed`: actions that did not reach their goals.  `touching`: actions that ended in contact with an object of the world.  `both`:
+    actions that did both.  `actions`: all actions.
+    """
 
     missed: int
     touching: int
@@ -268,17 +293,20 @@ class Contacts:
 
     @classmethod
     def of(cls, space: Lattice, seen: Ints, touched: NDArray[np.bool_]) -> Contacts:
-        """Count in transitions (T, 3), with `touched` (T,): whether each ended in contact."""
+        """Count the actions in transitions `seen` (T, 3); `touched`: (T,), whether each ended in contact with an object of the world."""
         missed = seen[:, 2] != space.goals[seen[:, 0], seen[:, 1]]
         return cls(int(missed.sum()), int(touched.sum()), int((missed & touched).sum()), len(seen))
 
     def __add__(self, other: Contacts) -> Contacts:
-        """Return the sums of both."""
+        """Return the sum of each number."""
         return Contacts(*(mine + others for mine, others in zip(astuple(self), astuple(other), strict=True)))
 
 
 def contacts(folder: Path, task: str) -> dict[str, dict[str, Contacts]]:
-    """Return by robot and part, with "offline" for all offline seeds together, how actions of a task ended in the run of a folder."""
+    """Return how the actions of a task ended, by robot and part; under "offline" for all offline runs together.
+
+    `folder`: of the experiment's run.  `task`: "arms", "table" or "published".
+    """
     robot, found = load_robot(ROBOT), dict[str, dict[str, Contacts]]()
     results = [r.values for r in load_cells(folder).values() if r.cell.settings["task"] == task]
     results = [values for values in results if f"touched_{TASKS[task].parts[0]}" in values]  # earlier versions kept no contacts
@@ -296,7 +324,7 @@ def contacts(folder: Path, task: str) -> dict[str, dict[str, Contacts]]:
 
 
 def contact_rows(folder: Path, task: str) -> dict[str, dict[str, int]]:
-    """Return `contacts` as rows of a table."""
+    """Return the numbers that `contacts` returns as rows of a table: a dict from "robot, part" to the numbers by column title."""
     return {
         f"{robot}, {part}": {
             "actions": one.actions,
@@ -313,7 +341,11 @@ COLORS = {"pybullet": "tab:red", "mujoco": "tab:green", "kinematic": "tab:blue"}
 
 
 def draw_distances(tasks: Mapping[str, Compared], least: int) -> Any:
-    """Draw a row for each task: the distances of live robots and offline seeds, and the success of single actions."""
+    """Draw the distances of live robots and offline runs, and the success of single actions, in one row of panels for each task.
+
+    `tasks`: the comparison by the name of the task.  `least`: tries that a state-action must have in both records.  Returns a Matplotlib
+    Figure.
+    """
     drawing = new_figure(13.0, 4.2 * len(tasks))
     panels = drawing.subplots(len(tasks), 3, squeeze=False)
     for (variation, agree, goals), (task, found) in zip(panels, tasks.items(), strict=True):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The left arm of the iCub beside a cup on the table: postures, grid, plant and agent of experiments in which it pushes the cup."""
+"""The left arm of the iCub beside a cup on the table: postures, grid, plant and agent of experiments in which the arm pushes the cup."""
 
 from __future__ import annotations
 
@@ -29,7 +29,11 @@ DETECTOR = "run_length"  # where the cup stands in its cell is hidden, so that o
 
 @dataclass(frozen=True)
 class Arrangement:
-    """Where the palm is in the postures, one for each pair of `palm_x` and `palm_y`, the grid, and where the cup stands at first; m."""
+    """An arrangement of postures, grid and cup, in m, root frame.
+
+    `palm_x`, `palm_y`: there is a posture with the palm at each pair of them.  `shape`: number of cells of the grid along x and y.  `cup`:
+    first place of the cup (x, y).  `x`, `y`: lowest and highest coordinate of the grid.
+    """
 
     palm_x: tuple[float, ...]
     palm_y: tuple[float, ...]
@@ -40,12 +44,15 @@ class Arrangement:
 
     @property
     def grid(self) -> Grid:
-        """The cells; the cup is put back to its first place when it leaves them."""
+        """The grid of cells; the cup is put back to its first place when it leaves the grid."""
         return Grid(self.x, self.y, self.shape)
 
     @property
     def goals(self) -> list[int]:
-        """The cells to which the cup is to be pushed: all but its first, and those nearest to the body, to which no hand can pull it."""
+        """The numbers of the cells to which the cup is to be pushed.
+
+        These are all cells but the first cell of the cup and the cells nearest to the body, to which no hand can pull the cup.
+        """
         grid = self.grid
         return [cell for cell in range(len(grid)) if cell != grid.cell_of(self.cup) and cell % self.shape[0] < self.shape[0] - 1]
 
@@ -60,7 +67,7 @@ ARRANGEMENTS: Mapping[str, Arrangement] = {
 
 @cache
 def robot() -> Robot:
-    """Return the iCub."""
+    """Return the iCub; every call returns the same object."""
     return mobee.load_robot("icub")
 
 
@@ -72,7 +79,10 @@ def _table() -> World:
 
 @cache
 def postures(x: tuple[float, ...], y: tuple[float, ...]) -> Space:
-    """Return the lattice of postures with the palm at each x and y [m], or as near as the arm comes; actions change one of the two."""
+    """Return the lattice of left-arm postures with the palm at each pair of x and y [m, root frame], 8 cm above the table.
+
+    Where the arm does not reach such a place, the palm is as near as possible.  Each action changes x or y by one step.
+    """
     body, model = robot(), Model(robot(), _table())
     columns = [body.motor_index(name) for name in JOINTS]
     samples = [_posture(model, (at_x, at_y, TABLE_TOP + PALM_HEIGHT))[columns] for at_y in y for at_x in x]
@@ -91,9 +101,9 @@ class Stage:
     """An arm, a cup that it pushes, and an agent that perceives the cup or something else in its place.
 
     Args:
-        arrangement: of postures, grid and cup.
+        arrangement: postures, grid and first place of the cup.
         seed: of the plant, the errors of perceived places, and the agent.
-        explorer: of the agent.
+        explorer: name of the agent's explorer.
     """
 
     def __init__(self, arrangement: Arrangement, seed: int, explorer: str) -> None:
@@ -102,7 +112,7 @@ class Stage:
         self._arm = OfflinePlant(Model(robot(), world), seed, dt=DT, active=JOINTS)
         self.cup = SlidingObject(self._arm, CUP, friction=FRICTION, area=(arrangement.x, arrangement.y))
         self.source: Callable[[], Array | None] = lambda: self.cup.place
-        """Returns the place (3,) m at which the agent perceives the cup, None if it does not; at first, the place of the cup."""
+        """Function that returns the place (3,) m at which the agent perceives the cup, None if it does not; at first the true place."""
         self._errors = np.random.default_rng([seed, 2107])
         self.plant = PerceivingPlant(self._arm, self._perceive)
         self.space = ObjectSpace(postures(arrangement.palm_x, arrangement.palm_y), arrangement.grid, CUP)
@@ -114,9 +124,18 @@ class Stage:
 
 
 def push_to(stage: Stage, goals: Sequence[int], tries: int, most: int, beliefs: OutcomeModel | None, seed: int) -> list[bool]:
-    """Push the cup from its first place to a cell, by plans with `beliefs`, by random actions for None or where no plan is known.
+    """Push the cup from its first place to goal cells, by plans, or by random actions; returns the success of each try.
 
-    Returns for each try whether the cup was perceived in the cell after one of at most `most` actions; the goals take turns.
+    A try is a success if the cup is perceived in the goal cell after one of at most `most` actions.
+
+    Args:
+        stage: arm, cup and agent.
+        goals: the goal cells, which take turns.
+        tries: number of tries.
+        most: largest number of actions of a try.
+        beliefs: transition model for the plans; None: all actions are random.  Where the plan finds no action that leads to the goal, the
+            action is random, too.
+        seed: of the random actions.
     """
     space, rng, reached = stage.space, np.random.default_rng([seed, 7]), list[bool]()
     planners = {} if beliefs is None else {goal: Planner(space, beliefs, space.in_cell(goal)) for goal in goals}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads all transitions of a run: from the stores of its agents, and from the cells of a sweep."""
+"""Reads all transitions of a run: from the SQLite stores of its agents, and from the cells of a sweep."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ SEEN = "seen"  # the array of a cell with one agent's transitions; with several 
 class Record:
     """The transitions of one agent.
 
-    `source`: their file, relative to the run's folder.  `settings`: of the agent, or of the cell.  `columns`: lists of equal length of
-    plain values; a cell has only n, s, a and s_next.
+    `source`: the file of the transitions, relative to the run's folder.  `agent`: its name; "" in a cell with one agent.  `settings`: of
+    the agent, or of the cell.  `columns`: lists of equal length of plain values, by name; a cell has only n, s, a and s_next.
     """
 
     source: str
@@ -32,9 +32,9 @@ class Record:
 
 
 def records(folder: Path) -> Iterator[Record]:
-    """Yield the transitions of every agent in a run's folder, or in one database.
+    """Yield the transitions of every agent in the folder of a run, or in one database if `folder` is a file.
 
-    Raises InvalidValue if there are none or an array has the wrong shape, MobeeError for a damaged file.
+    Raises InvalidValue if there are no transitions or an array has the wrong shape, MobeeError for a damaged file.
     """
     found = False
     for record in (*_of_stores(folder), *_of_cells(folder)):
@@ -45,7 +45,7 @@ def records(folder: Path) -> Iterator[Record]:
 
 
 def stores_of(run: Path) -> list[tuple[Path, str]]:
-    """Return the databases in a run's folder, or the one that is given itself, each with its name in the folder."""
+    """Return the path and the relative name of each database below the folder of a run; if `run` is a database itself, only this one."""
     if run.is_file():
         return [(run, run.name)]
     return [(file, str(file.relative_to(run))) for file in sorted(run.rglob("*.sqlite"))]

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Explorers of the literature on the agent of this library, and worlds of tables with rewards that are not known in advance.
+"""Explorers of the literature for the agent of this library, and tabular worlds with rewards that the agent does not know in advance.
 
-Each explorer plans with the agent's counts alone: of an action that was never tried it knows nothing.
+Each explorer is a function as described at `mobee.learning.explorers.Explorer`.  Its plans use only the counts of the agent: an action that
+was never tried is believed to stay in its state.
 """
 
 from __future__ import annotations
@@ -23,20 +24,20 @@ PLAN_TOLERANCE = 1e-3  # of plans in sampled models
 
 
 class RewardedPlant(TabularPlant):
-    """A tabular world with rewards that the agent has to discover: each depends on state and action."""
+    """A tabular world with rewards, which depend on state and action, and which the agent has to discover."""
 
     def __init__(self, world: TabularWorld, seed: int) -> None:
         states, actions = world.outcomes.shape[:2]
         super().__init__(DiscreteSpace(states, actions), world.outcomes, world.probabilities, seed)
         self.truth: Array = world.mean_reward
         self.known: Array = np.zeros((states, actions))
-        """The reward of each state and action that was tried, 0 of the others, shape (S, A)."""
+        """The reward of each state-action that was tried, and 0 for all others, shape (S, A)."""
         self.earned: list[float] = []
-        """The reward of each action so far."""
+        """The reward of each action so far, in order of time."""
         self.largest = float(self.truth.max())
 
     def act(self, part: str, target: Array) -> Outcome:
-        """Do an action, and note its reward."""
+        """Perform the action with the number `target[1]` in the present state, and record its reward; returns the outcome."""
         at = self.state, int(target[1])
         outcome = super().act(part, target)
         self.known[at] = self.truth[at]
@@ -45,37 +46,40 @@ class RewardedPlant(TabularPlant):
 
 
 def learned(agent: Explorable) -> Any:
-    """Return beliefs from the counts alone: an action that was never tried stays where it is."""
+    """Return the beliefs that follow from the agent's counts alone: an action that was never tried stays in its state."""
     return agent.model.debiased(goal=PRIOR, stay=0.0)
 
 
 def row(values: Array, state: int) -> Array:
-    """Return the values of the actions of a state, from those of all states (S, A)."""
+    """Return the values of the actions of one state, (A,), from the values (S, A) of all states."""
     found: Array = values[state]
     return found
 
 
 @dataclass(frozen=True, eq=False)
 class Curious:
-    """The published curiosity with an external reward: the information gain plus `weight` times the rewards that were found."""
+    """The published curiosity with an external reward: the reward is the information gain plus `weight` times the rewards found so far."""
 
     plant: RewardedPlant
     weight: float
 
     def __call__(self, agent: Explorable, state: int, rng: np.random.Generator) -> Array:
-        """Score the actions of a state."""
+        """Return the score of each action of a state, (A,): its value in a plan with information gain and known rewards."""
         return row(agent.plan(agent.model.reward + self.weight * self.plant.known)[1], state)
 
 
 @dataclass(frozen=True, eq=False)
 class CountBonus:
-    """MBIE-EB (Strehl and Littman 2008): rewards plus `bonus` / sqrt(tries); untried actions have the largest value that there is."""
+    """The explorer MBIE-EB (Strehl and Littman 2008): the reward is the known reward plus `bonus` / sqrt(tries).
+
+    For an action that was never tried, the reward is the largest reward of the world plus `bonus`.
+    """
 
     plant: RewardedPlant
     bonus: float
 
     def __call__(self, agent: Explorable, state: int, rng: np.random.Generator) -> Array:
-        """Score the actions of a state."""
+        """Return the score of each action of a state, (A,): its value in a plan with known rewards and the bonus."""
         tries = agent.model.tries
         bonus = self.bonus / np.sqrt(np.maximum(tries, 1))
         reward = np.where(tries > 0, self.plant.known + bonus, self.plant.largest + self.bonus)
@@ -84,13 +88,16 @@ class CountBonus:
 
 @dataclass(frozen=True, eq=False)
 class RMax:
-    """R-MAX (Brafman and Tennenholtz 2002): an action tried less than `known` times is believed to have the largest value that there is."""
+    """The explorer R-MAX (Brafman and Tennenholtz 2002).
+
+    An action with fewer than `known` tries is believed to stay in its state and to have the largest reward of the world.
+    """
 
     plant: RewardedPlant
     known: int
 
     def __call__(self, agent: Explorable, state: int, rng: np.random.Generator) -> Array:
-        """Score the actions of a state."""
+        """Return the score of each action of a state, (A,): its value in a plan in which actions with few tries have the largest reward."""
         known = agent.model.tries >= self.known
         beliefs = learned(agent)
         probabilities = np.where(known[..., None], beliefs.probabilities, 0.0)
@@ -100,9 +107,10 @@ class RMax:
 
 
 class PosteriorSampling:
-    """PSRL (Osband, Russo and Van Roy 2013): plans with a world drawn from the posterior, a new one after every `episode` steps.
+    """The explorer PSRL (Osband, Russo and Van Roy 2013): plans with a world that is drawn from the posterior.
 
-    Outcomes: Dirichlet with the count 1 / S of every state.  Rewards: normal with variance 1, known after the first try.
+    A new world is drawn after every `episode` steps.  Outcomes of a state-action: Dirichlet distribution, with the prior count 1 / S of
+    every state.  Rewards: normal distribution with mean 0 and variance 1 before the first try, known after it.
     """
 
     def __init__(self, plant: RewardedPlant, episode: int) -> None:
@@ -110,7 +118,7 @@ class PosteriorSampling:
         self._values = np.zeros(0)
 
     def __call__(self, agent: Explorable, state: int, rng: np.random.Generator) -> Array:
-        """Score the actions of a state."""
+        """Return the score of each action of a state, (A,): its value in the present sampled world."""
         if agent.transitions % self.episode == 0:
             tries, counts = agent.model.tries, all_counts(agent)
             drawn = rng.standard_gamma(counts + 1.0 / counts.shape[2])
@@ -124,20 +132,20 @@ class PosteriorSampling:
 
 @dataclass(frozen=True, eq=False)
 class EpsilonGreedy:
-    """Takes the action that is best by the observations so far, and a random one with probability `share`."""
+    """An explorer that takes the best action by the observations so far, and with probability `share` a random action."""
 
     plant: RewardedPlant
     share: float
 
     def __call__(self, agent: Explorable, state: int, rng: np.random.Generator) -> Array:
-        """Score the actions of a state."""
+        """Return the score of each action of a state, (A,): its value in a plan with known rewards; with probability `share` all are 0."""
         if rng.random() < self.share:
             return np.zeros(self.plant.known.shape[1])
         return row(agent.plan(self.plant.known, learned(agent), key="greedy")[1], state)
 
 
 def all_counts(agent: Explorable) -> Array:
-    """Return how often each action led to each state, shape (S, A, S)."""
+    """Return how often each state-action led to each state, (S, A, S); imagined outcomes of the prior are not counted."""
     model = agent.model
     real = np.where(model.counts > 0.0, model.counts - model.imagined, 0.0)
     states, actions, _ = real.shape
@@ -148,9 +156,10 @@ def all_counts(agent: Explorable) -> Array:
 
 
 def rooms(width: int = 11, slip: float = 0.1) -> TabularWorld:
-    """Return four rooms with a door in each wall, and four directions; a step slips to either side with the probability `slip` each.
+    """Return a grid world of four rooms, with a door in each wall and actions in four directions.
 
-    The reward 1 is in the corner opposite to the start, from where every action leads to the start.
+    The world has `width` x `width` cells, walls included.  A step slips to either side with the probability `slip` each.  The reward 1 is
+    in the corner opposite to the start; every action there leads to the start.
     """
     middle, doors = width // 2, (width // 4, width - 1 - width // 4)
     wall = np.zeros((width, width), dtype=bool)
@@ -173,7 +182,8 @@ def rooms(width: int = 11, slip: float = 0.1) -> TabularWorld:
 def random_world(seed: int, states: int = 50, actions: int = 4, branches: int = 5) -> TabularWorld:
     """Return a world in which each action leads to `branches` random states with random probabilities (Archibald et al. 1995).
 
-    One state in ten has rewards, uniform in 0 to 1.
+    Every action of a state has the same reward: 0 in state 0, 1 in the last state; each other state has with probability 0.1 a reward drawn
+    uniformly from 0 to 1, else 0.
     """
     rng = np.random.default_rng(seed)
     outcomes = np.array([[rng.choice(states, branches, replace=False) for _ in range(actions)] for _ in range(states)])

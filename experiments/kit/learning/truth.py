@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """True outcomes of the actions of a plant, measured by many tries, and errors of transition models with respect to them.
 
-The outcome of an action depends on the pose within the cell, and the momentum, with which the part arrived.  The tries are therefore
-those of a walk through the states, in which each action starts where the last one ended, as for an agent: half of its steps go to a
-random neighbour, half towards actions that need more tries.
+The outcome of an action depends on the pose within the cell, and on the momentum, with which the part arrived.  Therefore the tries are
+made on a walk through the states, in which each action starts where the last one ended, as for an agent: half of the steps are to a random
+neighbour, half are planned towards actions that need more tries.
 """
 
 from __future__ import annotations
@@ -28,9 +28,10 @@ CERTAIN = 0.9  # probability of the most likely outcome, below which an action i
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """Measured frequencies of the outcomes of each action; an OutcomeModel.
+    """Measured frequencies of the outcomes of each state-action; a `mobee.learning.value_iteration.OutcomeModel`.
 
-    `outcomes`, `probabilities`: (S, A, B), probability 0 where there is no action or no try.  `tries`: (S, A).
+    `outcomes`: (S, A, B), states reached.  `probabilities`: (S, A, B), their frequencies; 0 where there is no action or no try.  `tries`:
+    (S, A), number of tries.
     """
 
     outcomes: Ints
@@ -39,7 +40,7 @@ class Truth:
 
 
 def truth_of(space: Space, seen: Ints) -> Truth:
-    """Return the frequencies of outcomes in transitions, shape (T, 3): state, action, state reached."""
+    """Return the frequencies of the outcomes in transitions `seen` (T, 3), rows of state, action, state reached."""
     states, actions = space.goals.shape
     keys, counts = np.unique(np.ravel_multi_index(tuple(seen.T), (states, actions, states)), return_counts=True)
     pair, reached = np.divmod(keys, states)
@@ -55,7 +56,10 @@ def truth_of(space: Space, seen: Ints) -> Truth:
 
 
 def walk(space: Space, plant_of: Callable[[int], Plant], tries: int, most: int, seed: int) -> Ints:
-    """Walk until every action was tried `tries` times; returns the transitions (T, 3): state, action, state reached."""
+    """Walk through the states until every action was tried `tries` times; returns the transitions (T, 3): state, action, state reached.
+
+    `plant_of`: returns a plant for a seed.  `most`: largest number of transitions.
+    """
     plant, rng = plant_of(seed), np.random.default_rng(seed)
     model, values = TransitionModel(space), np.zeros(len(space))
     state = begin_nearby(space, plant, seed)
@@ -77,7 +81,7 @@ def walk(space: Space, plant_of: Callable[[int], Plant], tries: int, most: int, 
 
 
 def l1(beliefs: OutcomeModel, truth: OutcomeModel) -> Array:
-    """Return the sum of |p - q| over the outcomes of each state-action, 0 to 2, shape (S, A); NaN where the truth is unknown.
+    """Return the L1 error of the beliefs, the sum of |p - q| over the outcomes of each state-action, (S, A), 0 to 2; NaN without truth.
 
     The bins of the two models may differ in order and number, and several bins may stand for one state.
     """
@@ -95,23 +99,26 @@ def l1(beliefs: OutcomeModel, truth: OutcomeModel) -> Array:
 
 
 def most_likely(truth: OutcomeModel) -> Array:
-    """Return the probability of the most likely outcome of each action, shape (S, A); NaN where the truth is unknown."""
+    """Return the probability of the most likely outcome of each state-action, (S, A); NaN where the truth is unknown."""
     highest: Array = truth.probabilities.max(axis=-1)
     return np.where(highest > 0.0, highest, np.nan)
 
 
 def model_error(beliefs: OutcomeModel, truth: OutcomeModel) -> tuple[float, float]:
-    """Return the mean L1 error over all state-actions, and over the stochastic ones: most likely outcome below .9 (NaN: none)."""
+    """Return the mean L1 error of the beliefs over all state-actions, and over the stochastic ones only (NaN if there are none).
+
+    A state-action is stochastic if its most likely outcome has a probability below 0.9.
+    """
     error = l1(beliefs, truth)
     stochastic = most_likely(truth) < CERTAIN
     return float(np.nanmean(error)), float(error[stochastic].mean()) if stochastic.any() else float("nan")
 
 
 def sampling_error(truth: Truth) -> Array:
-    """Return the expected L1 distance between the frequencies and their true distribution, shape (S, A); NaN without tries.
+    """Return the expected L1 distance between the measured frequencies and the true distribution, (S, A); NaN without tries.
 
-    It is the sum over the outcomes of the mean absolute deviation of a share p of n tries, sqrt(2 p (1 - p) / (pi n)): smaller errors of
-    a model cannot be measured.
+    It is the sum over the outcomes of the mean absolute deviation of a share p of n tries, sqrt(2 p (1 - p) / (pi n)).  A model's error
+    below this distance cannot be measured.
     """
     p = truth.probabilities
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Faults of a running system as schedules: drawn by a seed, performed on its processes, and shortened as long as they still fail."""
+"""Schedules of faults of a running system: drawn by a seed, performed on its processes, and shortened as long as the system still fails."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ from services.common.bus import Bus
 _R = TypeVar("_R", bound=Reply)
 
 FORGED = ("false_stop", "release", "arm")
-"""Messages and calls in the name of another client: none may release a stop."""
+"""Kinds of faults that are messages or calls in the name of another client, to test that none of them releases an emergency stop."""
 
 FORGED_PART = "left_arm"
-"""The part that forged calls name."""
+"""The part of the robot that forged calls try to take, arm or release."""
 
 KINDS = ("kill", "freeze", "throttle", "disk", "files", "flood", "token", "duplicate")
-"""What a schedule may hold, see `FaultInjector`."""
+"""The kinds of faults that `draw` puts into a schedule; `FaultInjector` states what each one does."""
 _SHARES = (0.34, 0.24, 0.08, 0.08, 0.06, 0.08, 0.06, 0.06)  # of KINDS
 _FREEZES = (0.2, 1.0, 3.0)  # s; a service that is frozen for longer than 2 s is killed by the launcher
 _FLOODS = ("estop, set = false", "calls of robot_sim's stat", "tick, garbage", "commands, garbage", "tokens")
@@ -48,9 +48,9 @@ _THROTTLE_PERIOD = 0.05  # s
 
 @dataclass(frozen=True)
 class Fault:
-    """A fault that begins `at` s after the beginning of a schedule, and lasts for `duration` s; 0: it is over at once.
+    """A fault that begins `at` seconds after the beginning of a schedule and lasts for `duration` seconds; 0: it is over at once.
 
-    `kind`: see `FaultInjector`; `target`: the process, or the name of the flood.
+    `kind`: what happens, as `FaultInjector` states.  `target`: name of the service, or of the flood.
     """
 
     at: float
@@ -64,7 +64,7 @@ class Fault:
 
 
 def draw(seed: int, services: Sequence[str], seconds: float, period: float) -> list[Fault]:
-    """Return the schedule of a seed: faults of all KINDS on these services, about one in each `period` s, within `seconds`."""
+    """Draw the schedule of a seed: faults of all KINDS on the given services, within `seconds`, on average one in each `period` seconds."""
     rng = np.random.default_rng(seed)
     agents = [name for name in services if name.startswith("agent_")]
     faults = []
@@ -84,9 +84,10 @@ def draw(seed: int, services: Sequence[str], seconds: float, period: float) -> l
 
 
 def draw_around_stop(seed: int) -> list[Fault]:
-    """Return the schedule of a seed: an emergency stop at STOP_AT among two to five faults, some of which come before it.
+    """Draw the schedule of a seed: an emergency stop after 1 s, and two to five other faults, before or after the stop.
 
-    The launcher, which is the router, fails only after the stop: without a router no process receives it, which `mobee estop` reports.
+    The launcher, which is also the router, fails only after the stop: without a router no process would receive the stop, and `mobee estop`
+    reports this.
     """
     rng = np.random.default_rng(seed)
     faults = [Fault(STOP_AT, "stop")]
@@ -102,7 +103,10 @@ def draw_around_stop(seed: int) -> list[Fault]:
 
 
 def shrunk(schedule: Sequence[Fault], fails: Callable[[Sequence[Fault]], bool], tries: int) -> list[Fault]:
-    """Return a shorter schedule that still fails: halves, then single faults are left out, in at most `tries` performances."""
+    """Return a shorter schedule that still fails: halves of the schedule, then single faults are left out.
+
+    `fails`: performs a schedule and returns whether the system fails.  `tries`: largest number of calls of `fails`.
+    """
     kept, size = list(schedule), len(schedule) // 2
     while size >= 1 and tries > 0:
         for begin in range(0, len(kept), size):
@@ -123,20 +127,25 @@ def shrunk(schedule: Sequence[Fault], fails: Callable[[Sequence[Fault]], bool], 
 class FaultInjector:
     """Performs faults on the processes of one system.
 
-    kill and freeze send signals; throttle stops and continues a process every 50 ms; disk: it can write no byte to a file; files: it can
-    open no more files; flood: one of `floods.FLOODS`; token: a liveliness token with the name of a service and of no process; duplicate:
-    a second process of a service; stop: an emergency stop.  Of FORGED, false_stop is an EStop with `set = false`; release and arm are
-    calls in the name of the controller.
+    The kinds: kill, freeze: the process is killed, or stopped for a time, by a signal.  throttle: it is stopped and continued every 50 ms.
+    disk: it cannot write a byte to a file.  files: it cannot open more files.  flood: one of `floods.FLOODS` is sent.  token: a liveliness
+    token with the name of a service is declared without a process.  duplicate: a second process of a service is started.  stop: an
+    emergency stop is sent.  Of FORGED, false_stop is an EStop message with `set = false`; release and arm are calls in the name of the
+    controller.
     """
 
     def __init__(self, session: Any, endpoint: str, launcher: int | None = None, epoch: Callable[[], int | None] = lambda: None) -> None:
-        """`launcher`: its process, if schedules name it; `epoch`: returns the newest drive epoch of FORGED_PART, None if not known."""
+        """`session`: of Zenoh.  `endpoint`: address of the router.
+
+        `launcher`: process id of the launcher, needed if schedules name it.  `epoch`: returns the newest drive epoch of FORGED_PART
+        ("left_arm"), None if it is not known.
+        """
         self._session, self._endpoint, self._launcher, self._epoch = session, endpoint, launcher, epoch
         self._stops = Bus(session, "faults", logging.getLogger("faults")).publisher(EStop)
         self._ends: list[tuple[float, ExitStack]] = []  # monotonic time at which what lasts for a while is over
 
     def perform(self, schedule: Sequence[Fault]) -> list[float]:
-        """Perform all faults at their times, wait until the last is over, and return the monotonic time of each."""
+        """Perform all faults at their times, wait until the last one is over, and return the monotonic time [s] at which each began."""
         begun, times = time.monotonic(), []
         try:
             for fault in schedule:

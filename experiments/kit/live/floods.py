@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Floods of messages, calls, tokens and connections, each from a process of its own: `python -m experiments.kit.live.floods`.
+"""Floods of messages, calls, tokens and connections, each from its own process: `python -m experiments.kit.live.floods`.
 
-Any program on the machine can send them: they need no more than the documented contract of the bus.
+Any program on the machine can send them: the documented contract of the bus is sufficient.
 """
 
 from __future__ import annotations
@@ -117,7 +117,10 @@ FLOODS: dict[str, Callable[[str], None]] = {
 
 @contextmanager
 def flood(endpoint: str, name: str) -> Iterator[None]:
-    """Send one of FLOODS while the body of the `with` statement runs; raises LaunchFailed at its end if the flood has ended before."""
+    """Send the flood `name`, one of FLOODS, from another process while the body of a `with` statement runs.
+
+    `endpoint`: address of the router.  Raises LaunchFailed at the end if the flood has ended before.
+    """
     process = subprocess.Popen([sys.executable, "-m", "mobee_system.run", "experiments.kit.live.floods", endpoint, name])
     try:
         yield
@@ -129,7 +132,7 @@ def flood(endpoint: str, name: str) -> Iterator[None]:
 
 
 def main() -> None:
-    """Flood until the process is killed."""
+    """Send the flood that the command line names (endpoint, name) until the process is killed."""
     endpoint, name = sys.argv[1:]
     FLOODS[name](endpoint)
 

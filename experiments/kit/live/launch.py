@@ -28,7 +28,7 @@ TABLE = Path(__file__).with_name("table.xml")  # a world: the iCub's table with 
 
 
 class LaunchFailed(MobeeError):
-    """Raised when a system fails or does not end; the message holds the last line of its errors."""
+    """Raised if a live system fails or does not end; the message has the last line of its error output."""
 
 
 def summary_of(
@@ -41,10 +41,16 @@ def summary_of(
     runs: Path | None = None,
     watch: Callable[[int], None] = lambda pid: None,
 ) -> dict[str, Any]:
-    """Launch a scenario without monitor, wait for its end, and return its summary.  Raises LaunchFailed.
+    """Launch a scenario without monitor, wait for its end, and return its summary as a dict.  Raises LaunchFailed.
 
-    It ends after `duration` seconds, or in lockstep after this number of `ticks`.  `runs`: parent of its run folder; None: the folder
-    is temporary.  `watch` is called with the launcher's process id twice a second.
+    Args:
+        scenario: name or path.
+        settings: changes of the scenario, as "FIELD=VALUE".
+        duration: time after which the system ends, s; None: no limit.
+        ticks: in lockstep, number of ticks after which it ends; None: no limit.
+        environment: additional environment variables.
+        runs: folder in which the run folder is made; None: a temporary one.
+        watch: function that is called with the launcher's process id twice a second.
     """
     with tempfile.TemporaryDirectory() as scratch:
         argv = [*launch_command(scenario, free_endpoint(), runs or Path(scratch), settings), "--no-record"]
@@ -66,7 +72,11 @@ def summary_of(
 
 
 def launch_command(scenario: str, endpoint: str, runs: Path, settings: Sequence[str]) -> list[str]:
-    """Return the command that launches a scenario without monitor; `runs`: parent of the folders of runs."""
+    """Return the command that launches a scenario without monitor.
+
+    `endpoint`: address of its router.  `runs`: folder in which its run folder is made.  `settings`: changes of the scenario, as
+    "FIELD=VALUE".
+    """
     argv = [sys.executable, "-m", "mobee_system", "launch", scenario, "--headless", "--json", "--endpoint", endpoint, "--runs", str(runs)]
     return [*argv, *(f"--set={setting}" for setting in settings)]
 
@@ -86,7 +96,10 @@ def _watched(process: subprocess.Popen[str], watch: Callable[[int], None], secon
 
 
 def stop(process: subprocess.Popen[Any]) -> int:
-    """Stop a system that leads its own process group, by SIGINT if it reacts, else by SIGKILL; returns its exit code."""
+    """Stop a system whose launcher leads its own process group: by SIGINT, or by SIGKILL if it has not ended after 30 s.
+
+    `process`: the launcher.  Returns its exit code.
+    """
     if process.poll() is None:
         process.send_signal(signal.SIGINT)
         try:
@@ -105,7 +118,7 @@ def free_port() -> int:
 
 
 def free_endpoint() -> str:
-    """Return the address of a free TCP port on the loopback interface."""
+    """Return the address of a TCP port of the loopback interface that is free now, as "tcp/127.0.0.1:PORT"."""
     return f"tcp/127.0.0.1:{free_port()}"
 
 
@@ -114,25 +127,25 @@ JOB, DONE = "job.json", "done.jsonl"
 
 
 def write_job(folder: Path, job: Struct) -> None:
-    """Make the folder and write the job into it; results of an interrupted launch are removed."""
+    """Make the folder and write the job, a msgspec Struct, to job.json; results of an interrupted launch are removed."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / DONE).unlink(missing_ok=True)
     (folder / JOB).write_text(encoded(job))
 
 
 def read_job(folder: Path, kind: type[T]) -> T:
-    """Read the job written by `write_job`."""
+    """Return the job of type `kind` that `write_job` wrote into the folder."""
     return decoded((folder / JOB).read_text(), kind)
 
 
 def append_done(folder: Path, record: Struct) -> None:
-    """Append a result to the file; it is on disk when this returns."""
+    """Append a result, a msgspec Struct, to done.jsonl in the folder; it is in the file when this function returns."""
     with (folder / DONE).open("a") as file:
         file.write(encoded(record) + "\n")
 
 
 def read_done(folder: Path, kind: type[T]) -> list[T]:
-    """Read all results of a launch; [] if there is no file."""
+    """Return all results of type `kind` that `append_done` wrote into the folder; [] if there are none."""
     path = folder / DONE
     return [decoded(line, kind) for line in path.read_text().splitlines()] if path.exists() else []
 
@@ -141,7 +154,7 @@ PHYSICS = ("pybullet", "mujoco")  # back-ends of robot_sim; the published number
 
 
 def add_backend(parser: argparse.ArgumentParser) -> None:
-    """Add the option --backend."""
+    """Add the option --backend, the physics engine of robot_sim, to the parser."""
     parser.add_argument("--backend", choices=PHYSICS, default=PHYSICS[0], help=f"the physics (default: {PHYSICS[0]})")
 
 
@@ -189,11 +202,22 @@ def launch(
     simulated: str = "",
     backend: str = PHYSICS[0],
 ) -> dict[str, Any]:
-    """Launch the live robot with physics and a performer; returns the summary and leaves the recording in `folder`.
+    """Launch the live iCub with physics and a performer, wait for its end, and return its summary.  Raises LaunchFailed.
 
-    `perform`: the performer's function, see `performer.config.Config`; `rate`: Hz; `speed`: share of the motors' speed; `seconds`: robot
-    time after which the system ends; `simulated`: the simulator's world if it is not the model's; `backend`: of PHYSICS.  Raises
-    LaunchFailed.
+    The performer is a service that calls a function of an experiment.
+
+    Args:
+        folder: where scenario, recording and run folder are written.
+        perform: the performer's function, as "package.module:function"; it is called with the service and this folder.
+        title: of the scenario.
+        world: name or path of the model's world.
+        seed: of the robot.
+        rate: control rate, Hz.
+        speed: share of the motors' largest speed.
+        seconds: robot time after which the system ends at the latest.
+        lockstep: whether the ticks wait for all services; False: real time.
+        simulated: name or path of the simulator's world; "": `world`.
+        backend: physics engine of robot_sim, "pybullet" or "mujoco".
     """
     folder.mkdir(parents=True, exist_ok=True)
     mode = f'mode = "lock"\npatience = {TICK_TIMEOUT:g}' if lockstep else ""

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Draws messages, requests and tokens of the bus that are nearly valid: right keys, types, fields and lengths, and values of all kinds.
 
-Most values are valid, and are taken from the running system; some are at or beyond a bound, of another type, left out, or added. Bytes
-are changed in a few. `python -m experiments.kit.live.malformed` sends them.
+Most values are valid, and are taken from the running system.  Some are at or beyond a bound, of another type, left out, or added.  In a few
+messages, bytes are changed.  `python -m experiments.kit.live.malformed` sends them.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ OTHER: tuple[Any, ...] = (None, True, 0, -1, 1.5, "x", b"\x00", [], {}, [[[]]], 
 
 @dataclass(frozen=True, slots=True)
 class Drawn:
-    """A message to send: `key`, payload and encoding; `call`: send it as a call, which has a reply."""
+    """A drawn message: key, payload and encoding; `call`: whether it is sent as a call, which has a reply."""
 
     key: str
     payload: bytes
@@ -83,7 +83,10 @@ class Drawn:
 
 
 class Drawer:
-    """Draws messages and requests; `parts`: number of motors of each part; the same seed draws the same ones."""
+    """Draws messages, requests and tokens; the same seed gives the same ones.
+
+    `parts`: number of motors of each part, by name.
+    """
 
     def __init__(self, seed: int, parts: dict[str, int]) -> None:
         self._random = random.Random(seed)
@@ -93,21 +96,21 @@ class Drawer:
         self.run, self.k, self.t = "-", 0, 0  # of the newest tick
 
     def message(self) -> Drawn:
-        """Draw a message of any stream."""
+        """Draw a message of a random stream of the bus."""
         cls = self._random.choice(self._streams)
         part = self._random.choice([*self._parts])
         name = {"part": part}.get(cls.stream.variable) or self._random.choice(NAMES)
         return self._drawn(cls.stream.key(name), cls, self._parts[part], call=False)
 
     def request(self) -> Drawn:
-        """Draw a request of any call."""
+        """Draw a request of a random call of the bus."""
         pattern, verb, cls = self._random.choice(self._calls)
         part = self._random.choice([*self._parts])
         key = pattern.replace("{verb}", verb).replace("{part}", part).replace("{service}", self._random.choice(SERVICES))
         return self._drawn(key, cls, self._parts[part], call=True, valid=verb not in ENDS)
 
     def token(self) -> str:
-        """Draw the key of a liveliness token."""
+        """Draw the key of a liveliness token, of a service, the router or an unknown process."""
         who = self._random.choice((*SERVICES, "router", "stranger"))
         return keys.alive(who, f"i{self._random.randrange(INSTANCES)}")
 
@@ -178,7 +181,10 @@ class Drawer:
 
 
 def send(endpoint: str, seed: int, count: int, parts: dict[str, int]) -> Counter[str]:
-    """Send `count` drawn messages, requests and tokens; return how many of each."""
+    """Send `count` drawn messages, requests and tokens to a running system; returns the numbers sent: "messages", "calls", "tokens".
+
+    `endpoint`: address of the router.  `parts`: number of motors of each part, by name.
+    """
     drawer, draw, sent = Drawer(seed, parts), random.Random(seed), Counter[str]()
     with open_client(endpoint) as session:
         liveliness: Any = session.liveliness()
@@ -213,7 +219,7 @@ def _struct(cls: type[Struct]) -> StructType:
 
 
 def main() -> None:
-    """Send random messages, calls and tokens, and print their numbers."""
+    """Send random messages, calls and tokens, and print their numbers; the command line has endpoint, seed, count and parts (JSON)."""
     endpoint, seed, count, parts = sys.argv[1:]
     print(json.dumps(send(endpoint, int(seed), int(count), json.loads(parts))))
 

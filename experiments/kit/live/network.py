@@ -29,12 +29,12 @@ _PATIENCE = 5.0  # s
 
 
 def inside(argv: Sequence[str]) -> list[str]:
-    """Return the command that runs `argv` in a network namespace of its own, where it may make a Network."""
+    """Return the command that runs the command `argv` in a new network namespace, in which it may make a `Network`."""
     return ["unshare", "--net", "--map-root-user", "--", *argv]
 
 
 def refused() -> str:
-    """Return why this machine does not let a user make network namespaces and interfaces in them; empty if it does."""
+    """Return the reason why a user cannot make network namespaces and interfaces on this machine; "" if this is possible."""
     program = "from experiments.kit.live.network import Network\nwith Network(0): pass"
     try:
         done = subprocess.run(inside([sys.executable, "-c", program]), capture_output=True, text=True, timeout=30.0)
@@ -44,10 +44,13 @@ def refused() -> str:
 
 
 class Network:
-    """The namespace of this process as the first host, another one as the second, and the wire between them; see `inside`."""
+    """Two hosts and the wire between them: the network namespace of this process is the first host, a new namespace the second.
+
+    A `with` statement makes and removes the second host and the wire.  The process must run in its own namespace, as by `inside`.
+    """
 
     def __init__(self, seed: int) -> None:
-        """`seed`: of what the wire does to packets."""
+        """`seed`: of the random faults of the wire."""
         self._seed = seed
         self._wire: subprocess.Popen[bytes] | None = None
         self._files: list[int] = []
@@ -71,21 +74,21 @@ class Network:
             os.close(file)
 
     def set(self, faults: Faults) -> None:
-        """Set what the wire does to packets from now on."""
+        """Set the faults of the wire from now on: delay, loss, reordering and cut."""
         assert self._wire is not None and self._wire.stdin is not None
         self._wire.stdin.write(msgspec.json.encode(faults) + b"\n")
         self._wire.stdin.flush()
 
     def plug(self, up: bool) -> None:
-        """Set the interface of the second host up or down, which its programs notice at once."""
+        """Set the network interface of the second host up or down; unlike a cut of the wire, its programs notice this at once."""
         _run(self.on_second(["ip", "link", "set", "mobee0", "up" if up else "down"]))
 
     def on_first(self, argv: Sequence[str]) -> list[str]:
-        """Return the command that runs `argv` on the first host."""
+        """Return the command that runs the command `argv` on the first host."""
         return list(argv)
 
     def on_second(self, argv: Sequence[str]) -> list[str]:
-        """Return the command that runs `argv` on the second host, whose monotonic clock is AHEAD."""
+        """Return the command that runs the command `argv` on the second host, whose monotonic clock is ahead by AHEAD (3600 s)."""
         namespace = f"--net=/proc/{os.getpid()}/fd/{self._second}"
         return ["nsenter", namespace, "unshare", "--time", f"--monotonic={AHEAD}", f"--boottime={AHEAD}", "--", *argv]
 

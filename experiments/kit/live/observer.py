@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Observes a running system while it is disturbed: its states, and the transitions that agents published beside those on disk."""
+"""Observes a running system while it is disturbed: the states of its parts, and the transitions that agents publish and store on disk."""
 
 from __future__ import annotations
 
@@ -27,7 +27,12 @@ OLDEST = 0.1  # s between the beginning of a tick and of the last one in which a
 
 @dataclass
 class Moment:
-    """A part at one tick."""
+    """The state of a part at one tick.
+
+    `run`, `k`: the run and the number of the tick.  `t`: s, simulated time of the bus.  `at`: s, monotonic time of the machine.  `gate`,
+    `mode`: of the gate, as in the message `State`.  `age`: ticks, of the command in force.  `q`: rad.  `speed`: rad/s, of the fastest
+    motor.
+    """
 
     run: str
     k: int
@@ -42,7 +47,17 @@ class Moment:
 
 @dataclass
 class Observer:
-    """Records the states of all parts, when each tick began, and the transitions that agents publish."""
+    """Records the states of all parts, when each tick began, and the transitions that agents publish.
+
+    Attributes:
+        parts: states by part, in order of arrival.
+        ticks: monotonic time [s] at which a tick began, by run and number.
+        motions: changes of a part's motion, by part: time of arrival [s], status, action.
+        published: state, action, state reached, settled, duration, by agent and number of the transition.
+        conflicts: a line for each number under which an agent published two different transitions.
+        locked: whether the robot runs in lockstep.
+        lock: held while the other fields change.
+    """
 
     parts: dict[str, list[Moment]] = field(default_factory=dict)
     ticks: dict[tuple[str, int], float] = field(default_factory=dict)  # run, k -> s, by robot_sim's monotonic clock
@@ -53,7 +68,7 @@ class Observer:
     lock: threading.Lock = field(default_factory=threading.Lock)
 
     def attach(self, session: Any) -> None:
-        """Subscribe to the streams of all parts and agents."""
+        """Subscribe to the ticks and to the streams of all parts and agents; `session`: of Zenoh."""
         listen(session, Tick.stream.key(), self._note_tick)
         listen(session, State.stream.keys(), self._note_state)
         listen(session, Motion.stream.keys(), self._note_motion)
@@ -100,22 +115,23 @@ class Observer:
                 self.conflicts.append(f"{key[0]} published two transitions {key[1]}")
 
     def newest(self, part: str) -> Moment | None:
-        """Return the last state of a part."""
+        """Return the last state of a part; None if none was received."""
         with self.lock:
             return self.parts[part][-1] if self.parts.get(part) else None
 
     def all_armed(self, count: int) -> bool:
-        """Return whether all `count` parts follow commands now."""
+        """Return whether there are `count` parts, and all of them are armed, by states that are not older than 0.5 s."""
         since = time.monotonic() - FRESH
         with self.lock:
             newest = [states[-1] for states in self.parts.values()]
         return len(newest) == count and all(one.gate == "armed" and one.at > since for one in newest)
 
     def take(self) -> tuple[dict[str, list[Moment]], list[float]]:
-        """Return the states so far and the ages [s] of the commands that they obeyed; keep only the last state of each part.
+        """Return the states so far by part, and the ages [s] of the commands that they obeyed; keep only the last state of each part.
 
-        An age is a lower bound: a tick is published after the gate has judged, and a busy machine may take long between the two, so that
-        the tick before is the one that counts.  A state whose ticks were not received has none.
+        The age of a command is the time from the beginning of the tick that it answers to the beginning of the tick in which the robot
+        obeyed it. It is a lower bound: a tick is published after the gate has judged its command, and a busy machine may take long between
+        the two, so the beginning of the tick before is used.  States whose ticks were not received have no age.
         """
         with self.lock:
             taken, self.parts = self.parts, {part: states[-1:] for part, states in self.parts.items()}
@@ -127,7 +143,11 @@ class Observer:
 
 @dataclass(frozen=True)
 class Stop:
-    """How a part came to rest after a fault: times [s] from the fault, and the distance [rad]; None: not within the time given."""
+    """How a part came to rest after a fault; None: not within the given time.
+
+    `hold`, `rest`: s from the fault until the gate held the part, and until it was at rest.  `distance`: rad, largest motion of a motor
+    until then.
+    """
 
     hold: float | None
     rest: float | None
@@ -135,7 +155,10 @@ class Stop:
 
 
 def stop_after(states: list[Moment], fault: float, until: float) -> Stop | None:
-    """Return how a part stopped after a fault at a monotonic time; None if it was not moving on command then."""
+    """Return how a part stopped after a fault; None if it was not moving by a command at that time.
+
+    `states`: of the part, in order of time.  `fault`, `until`: monotonic times [s] of the fault and of the end of the observation.
+    """
     before = [state for state in states if state.at <= fault]
     if not before or before[-1].gate != "armed" or before[-1].mode == "hold" or before[-1].speed < MOVES:
         return None
@@ -147,9 +170,10 @@ def stop_after(states: list[Moment], fault: float, until: float) -> Stop | None:
 
 
 def survived(changes: list[tuple[float, str, str]], fault: float, until: float) -> bool | None:
-    """Return whether the action that was under way at a monotonic time has survived until a later one; None if there was none.
+    """Return whether the action that was under way at the time `fault` has survived until the time `until`; None if there was no action.
 
-    It has survived if it still moves, waits for the model, or has ended with an outcome.
+    The action has survived if it still moves, waits for the model, or has ended with an outcome.  `changes`: of the part's motion: time of
+    arrival [s], status, action; `fault`, `until`: monotonic times [s].
     """
     before = [change for change in changes if change[0] <= fault]
     if not before or before[-1][1] != "moving":
@@ -163,9 +187,10 @@ def survived(changes: list[tuple[float, str, str]], fault: float, until: float) 
 
 
 def violations(states: Mapping[str, list[Moment]], robot: Robot, noise: float) -> list[str]:
-    """Return a line for each broken promise in the states of one schedule; `noise`: largest of the encoders, rad.
+    """Return a line of text for each broken promise of the system in the states of one schedule of faults.
 
-    Within a run time never goes back, and no motor is faster than the gate allows.  In lockstep tick 0 is repeated until all have answered.
+    The promises: within a run time never decreases, and no motor is faster than the gate allows.  In lockstep, tick 0 may be repeated until
+    all services have answered.  `states`: by part.  `noise`: largest error of the encoders, rad.
     """
     found = []
     for part, moments in states.items():
@@ -183,23 +208,34 @@ def violations(states: Mapping[str, list[Moment]], robot: Robot, noise: float) -
 
 
 def too_old(ages: Sequence[float]) -> list[str]:
-    """Return a line if a command was obeyed later than OLDEST; `ages` [s] as `Observer.take` returns them."""
+    """Return one line of text if a command was obeyed more than OLDEST (0.1 s) after the tick that it answers, else [].
+
+    `ages`: of the commands, s, as `Observer.take` returns them.
+    """
     oldest = max(ages, default=0.0)
     return [f"a command was obeyed {1e3 * oldest:.0f} ms after the tick that it answers began"] if oldest > OLDEST else []
 
 
 @dataclass(frozen=True)
 class Kept:
-    """The transitions of all agents on disk, compared with those that they published."""
+    """Numbers of the transitions of all agents on disk, compared with the published ones.
+
+    `kept`: on disk.  `lost`: published, but not on disk.  `differing`: on disk with other values than published, or published twice with
+    different values.  `gaps`: numbers that occur twice on disk; a missing number raises MobeeError when the
+    store is read.
+    """
 
     kept: int
     lost: int  # published and not kept
     differing: int  # kept otherwise than published
-    gaps: int  # numbers that are missing or twice
+    gaps: int  # numbers that occur twice on disk
 
 
 def compare_transitions(observer: Observer, run_dir: Path, agents: list[str]) -> Kept:
-    """Compare the transitions that were published so far with the store of a run, whose agents may still be learning."""
+    """Compare the transitions that the agents published so far with those in the store of the run, and return the numbers.
+
+    `run_dir`: folder of the run.  `agents`: names of the agents that are compared; they may still be learning.
+    """
     with observer.lock:
         published, conflicts = dict(observer.published), len(observer.conflicts)
     kept = lost = differing = gaps = 0

@@ -19,7 +19,10 @@ COLUMNS = ("k", "pair", "depth")
 
 
 class Touch(Struct, frozen=True):
-    """A contact event: a pair of shapes came into contact and separated again."""
+    """A contact event: two shapes came into contact and separated again.
+
+    `pair`: names of the shapes.  `begin`, `end`: first and last tick.  `depth`: largest depth, m.
+    """
 
     pair: str
     begin: int  # tick
@@ -28,19 +31,23 @@ class Touch(Struct, frozen=True):
 
 
 def read_positions(folder: Path, robot: Robot) -> Array:
-    """Read the joint positions at the ends of the ticks, (T, n) rad; row 0 is tick 1."""
+    """Read the recorded joint positions at the ends of all ticks, (T, n) rad, from the folder of a recording; row 0 is tick 1."""
     q: Array = np.fromfile(folder / POSITIONS).reshape(-1, len(robot.motors))
     return q
 
 
 def read_touches(path: Path, dt: float) -> list[Touch]:
-    """Read the contact events of a file in order of their beginning; `dt`: duration of a tick [s]."""
+    """Read the contact events from the file contacts.csv of a recording, in order of their beginning; `dt`: duration of a tick [s]."""
     rows = ((int(row["k"]), row["pair"], float(row["depth"])) for row in read_records(path, COLUMNS))
     return touches(rows, round(MIN_GAP / dt))
 
 
 def touches(rows: Iterable[tuple[int, str, float]], gap: int) -> list[Touch]:
-    """Group rows (tick, pair, depth [m]), in order of the ticks, into events; `gap`: ticks that separate two events of a pair."""
+    """Group contacts into events, and return the events in order of their beginning.
+
+    `rows`: tick, pair of shapes and depth [m] of each contact, in order of the ticks.  `gap`: a new event of a pair begins if its last
+    contact was more than so many ticks ago.
+    """
     open_: dict[str, Touch] = {}
     found: list[Touch] = []
     for k, pair, depth in rows:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A live system that runs during a `with` statement: launched as a user launches it, and ended as by Ctrl-C."""
+"""A live system that runs during a `with` statement: it is launched as a user launches it, and ended as by Ctrl-C."""
 
 from __future__ import annotations
 
@@ -24,7 +24,11 @@ _STATES = "state"  # folder of states
 
 @dataclass
 class System:
-    """A launcher process and the place of its output."""
+    """A running system.
+
+    `process`: its launcher.  `endpoint`: address of its router.  `folder`: where run folder, error output and record of emergency stops
+    are.
+    """
 
     process: subprocess.Popen[str]
     endpoint: str
@@ -32,25 +36,25 @@ class System:
 
     @property
     def run_dir(self) -> Path:
-        """The folder of its run."""
+        """The folder of the system's run."""
         return next((self.folder / "runs").iterdir())
 
     @property
     def stop_record(self) -> StopRecord:
-        """The record of its emergency stops."""
+        """The record of the system's emergency stops."""
         return StopRecord.of_endpoint(self.endpoint, self.folder / _STATES)
 
     @property
     def says(self) -> str:
-        """The lines of its screen so far."""
+        """The text that the launcher has written to standard error so far."""
         return (self.folder / "launcher.err").read_text()
 
 
 @contextmanager
 def running(folder: Path, scenario: str) -> Iterator[System]:
-    """Run a system without monitor, and yield it when all its services are ready; stops it afterwards.
+    """Launch a scenario without monitor, yield the system when all its services are ready, and stop it at the end of the `with` statement.
 
-    `folder`: an empty one.  Raises LaunchFailed.
+    `folder`: an empty folder for its files.  `scenario`: name or path.  Raises LaunchFailed.
     """
     endpoint = free_endpoint()
     environment = {**os.environ, "XDG_STATE_HOME": str(folder / _STATES)}
@@ -68,7 +72,10 @@ def running(folder: Path, scenario: str) -> Iterator[System]:
 
 
 def wait_for(condition: Callable[[], Any], timeout: float, what: str, period: float = 0.01) -> Any:
-    """Return the condition's first true value; raises LaunchFailed after `timeout` s."""
+    """Call `condition` every `period` s until it returns a true value, and return this value; raises LaunchFailed after `timeout` s.
+
+    `what`: text for the message, what was expected.
+    """
     give_up = time.monotonic() + timeout
     while not (value := condition()):
         if time.monotonic() > give_up:
@@ -78,7 +85,7 @@ def wait_for(condition: Callable[[], Any], timeout: float, what: str, period: fl
 
 
 def stat_of(session: Any, who: str, timeout: float = 0.5) -> Stat | None:
-    """Return the status of a service; None if it does not answer."""
+    """Return the status of the service `who`; None if it does not answer within `timeout` s.  `session`: of Zenoh."""
     try:
         return rpc.call(session, "observer", keys.service_rpc(who, "stat"), Empty, Stat, timeout=timeout)
     except rpc.CallFailed:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A wire between two network interfaces, whose faults are drawn by a seed: delay, loss, reordering, and a cut that nothing reports.
+"""A wire between two network interfaces, with faults drawn by a seed: delay, loss, reordering, and a cut that nothing reports.
 
-The kernel's own emulator (netem) has no seed before Linux 6.6 and is missing from many kernels; TUN interfaces are not.
+The kernel's own emulator (netem) has no seed before Linux 6.6 and is missing from many kernels; TUN interfaces are present there.
 """
 
 from __future__ import annotations
@@ -23,7 +23,11 @@ _AT_ONCE = 64  # packets that are read in a row
 
 
 class Faults(Struct, frozen=True):
-    """What happens to each packet, in both directions."""
+    """What the wire does to packets, in both directions.
+
+    `delay`: s.  `loss`: share of packets that are lost.  `reorder`: share of packets that are not delayed, and so overtake others.  `cut`:
+    all packets are lost.
+    """
 
     delay: float = 0.0  # s
     loss: float = 0.0  # share of packets that are lost
@@ -32,10 +36,16 @@ class Faults(Struct, frozen=True):
 
 
 class Wire:
-    """Carries packets between two TUN interfaces."""
+    """Carries packets between two TUN interfaces.
+
+    Attributes:
+        faults: what happens to packets that are taken from now on.
+        carried: number of packets that were not lost.
+        lost: number of lost packets.
+    """
 
     def __init__(self, ends: tuple[int, int], seed: int) -> None:
-        """`ends`: file descriptors of the interfaces."""
+        """`ends`: file descriptors of the two interfaces.  `seed`: of the random faults."""
         self.faults = Faults()
         self.carried = self.lost = 0
         self._other = {ends[0]: ends[1], ends[1]: ends[0]}
@@ -45,11 +55,11 @@ class Wire:
             os.set_blocking(end, False)
 
     def wait(self) -> float | None:
-        """Return the time until the next packet arrives, s; None if none is under way."""
+        """Return the time [s] until the next packet is due for delivery; None if there is no packet on the wire."""
         return max(0.0, self._under_way[0][0] - time.monotonic()) if self._under_way else None
 
     def take(self, end: int) -> None:
-        """Read the packets that an interface has sent."""
+        """Read the packets that an interface has sent, at most 64, and apply the faults; `end`: file descriptor of the interface."""
         for _ in range(_AT_ONCE):
             try:
                 packet = os.read(end, _LARGEST)
@@ -64,7 +74,7 @@ class Wire:
             heapq.heappush(self._under_way, (time.monotonic() + delay, self.carried, self._other[end], packet))
 
     def deliver(self) -> None:
-        """Deliver the packets whose time has come."""
+        """Write the packets that are due to the interface at the other end of the wire."""
         while self._under_way and self._under_way[0][0] <= time.monotonic():
             *_, end, packet = heapq.heappop(self._under_way)
             with suppress(OSError):  # the interface is down, or full: the packet is lost
@@ -72,7 +82,10 @@ class Wire:
 
 
 def run(ends: tuple[int, int], seed: int, commands: BinaryIO) -> None:
-    """Carry packets until `commands` ends; each line of it holds new Faults as JSON."""
+    """Carry packets between two interfaces until the stream `commands` ends.
+
+    `ends`: file descriptors of the interfaces.  `seed`: of the random faults.  `commands`: each line has new `Faults` as JSON.
+    """
     wire = Wire(ends, seed)
     with selectors.DefaultSelector() as selector:
         for source in (*ends, commands.fileno()):

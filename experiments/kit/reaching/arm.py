@@ -3,8 +3,8 @@
 
 The four joints of the published lattice move; the wrist and the fingers are rigid at home.  `reach_space`, `reach_plant` and
 `learned_beliefs` are the published set-up (thesis 8.3): the robot of 2014, under either law, with equidistant neighbours.  The functions
-with a `law` belong to the experiments that compare with planners: today's robot under the default law, or that of 2014 under the published
-one, with the 16 nearest states as neighbours.
+with an argument `law` (except `reach_plant`) belong to the experiments that compare with planners: today's robot under the law "default",
+or the robot of 2014 under the law "published", with the 16 nearest states as neighbours.
 """
 
 from __future__ import annotations
@@ -38,7 +38,10 @@ TRANSITIONS = 3000  # curious ones, enough to learn the lattice (thesis 7.2.2: 2
 
 @dataclass(frozen=True)
 class Law:
-    """A control law: gains, time step [s], and whether its reaches aim at the "centre" or the "surface" of the target."""
+    """A control law.
+
+    `gains`: its gains.  `dt`: control period, s.  `aim`: whether reaches aim at the "centre" or the "surface" of the target.
+    """
 
     gains: Gains
     dt: float
@@ -47,24 +50,33 @@ class Law:
 
 @cache
 def laws() -> dict[str, Law]:
-    """Return the published law, whose reaches pull against the attractor, and the default law, whose reaches arrive at the target."""
+    """Return the two control laws by name, "published" and "default".
+
+    Under the published law the force of a reach pulls against the attractor; under the default law the marker arrives at the target.
+    """
     return {"published": Law(Gains.published_2014(), DT, "centre"), "default": Law(Gains.default(), 0.01, "surface")}
 
 
 @cache
 def reach_space() -> Lattice:
-    """Return the 81 states of the right arm's four joints with equidistant neighbours: 432 actions."""
+    """Return the 81 states of the right arm's four joints with equidistant neighbours: 432 actions; every call returns the same object."""
     return arm_space(RANK3, joints=RIGHT)
 
 
 def reach_plant(seed: int, law: str = "published") -> OfflinePlant:
-    """Return a plant of the four motors of the right arm, in an empty world."""
+    """Return a plant of the robot of 2014 in an empty world, in which only the four motors of the right arm move.
+
+    `seed`: of the plant.  `law`: name of the control law, "published" or "default".
+    """
     chosen = laws()[law]
     return OfflinePlant(Model(published_robot()), seed, chosen.gains, dt=chosen.dt, active=RIGHT)
 
 
 def learned_beliefs(plant: OfflinePlant, seed: int, transitions: int = TRANSITIONS) -> OutcomeModel:
-    """Return the transition model that a curious agent learns without a target; reaching does not change it (thesis 8.1)."""
+    """Return the transition model that a curious agent learns on the plant without a target; reaching does not change it (thesis 8.1).
+
+    `seed`: of the agent and its start.  `transitions`: number that the agent makes.
+    """
     space = reach_space()
     begin_anywhere(space, plant, seed)
     agent = CuriousAgent(space, plant, seed=seed)
@@ -74,26 +86,35 @@ def learned_beliefs(plant: OfflinePlant, seed: int, transitions: int = TRANSITIO
 
 @cache
 def body(law: str = "default") -> Robot:
-    """Return today's robot, or that of 2014 for the published law."""
+    """Return today's robot for the law "default", the robot of 2014 for the law "published"; every call returns the same object."""
     return published_robot() if law == "published" else mobee.load_robot("icub")
 
 
 @cache
 def space(law: str = "default") -> Lattice:
-    """Return the 81 states with the 16 nearest as neighbours."""
+    """Return the 81 states of the right arm's four joints with the 16 nearest states as neighbours.
+
+    `law`: "default" with today's robot, or "published" with the robot of 2014.  Every call returns the same object.
+    """
     return Lattice(body(law), RIGHT, RANK3, ARM_NEIGHBOURS)
 
 
 @cache
 def hands(law: str = "default") -> Array:
-    """Return the position of the palm in each state, (S, 3) m, root frame, with the wrist at home."""
+    """Return the position of the right palm in each state of `space`, (S, 3) m, root frame, with the wrist at home.
+
+    `law`: "default" with today's robot, or "published" with the robot of 2014.
+    """
     found: Array = Model(body(law)).evaluate(_poses(law)).position(MARKER)
     return found
 
 
 @cache
 def jacobians(law: str = "default") -> Array:
-    """Return the Jacobian of the palm in each state, (S, 3, 4) m/rad."""
+    """Return the derivatives of the right palm's position by the four joints in each state of `space`, (S, 3, 4) m/rad.
+
+    `law`: "default" with today's robot, or "published" with the robot of 2014.
+    """
     return Model(body(law)).jacobian(_poses(law), MARKER)[:, :3, _motors(law)]
 
 
@@ -109,32 +130,48 @@ def _motors(law: str) -> list[int]:
 
 
 def arm_plant(seed: int, world: World | None = None, motors: MotorParameters | None = None, law: str = "default") -> OfflinePlant:
-    """Return a plant of the arm; `motors`: None for the default motors."""
+    """Return a plant in which only the four motors of the right arm move.
+
+    `seed`: of the plant.  `world`: None: empty.  `motors`: None: the default ones.  `law`: "default" with today's robot, or "published"
+    with the robot of 2014.
+    """
     chosen = laws()[law]
     return OfflinePlant(Model(body(law), world), seed, chosen.gains, motors, chosen.dt, active=RIGHT)
 
 
 def arm_belief(world: World | None = None, cables: bool = True, turns: Array | None = None, law: str = "default") -> PeerBelief:
-    """Return the model of a planner: a world, the cable constraints if `cables`, and joint offsets `turns` (4,) rad."""
+    """Return the model of a planner for the right arm.
+
+    `world`: as the planner believes it to be; None: empty.  `cables`: whether it knows the cable constraints.  `turns`: (4,) rad, believed
+    minus measured joint angles; None: 0.  `law`: "default" with today's robot, or "published" with the robot of 2014.
+    """
     clauses = [clause for clause in body(law).clauses if clause.part == PART] if cables else []
     return PeerBelief(Model(body(law), world), RIGHT, MARKER, clauses, laws()[law].gains, turns)
 
 
 def learned_transitions(plant: OfflinePlant, seed: int, transitions: int = TRANSITIONS, law: str = "default") -> TransitionModel:
-    """Return the transition model of a curious agent, learned without a target."""
+    """Return the transition model that a curious agent learns on the plant without a target.
+
+    `seed`: of the agent.  `transitions`: number that the agent makes.  `law`: "default" with today's robot, or "published" with the robot
+    of 2014.
+    """
     agent = CuriousAgent(space(law), plant, seed=seed)
     agent.run(transitions)
     return agent.model
 
 
 def reach_agent(plant: ReachPlant, model: TransitionModel, seed: int, law: str = "default") -> ReachAgent:
-    """Return the learner: default predictor, updated transition model (thesis 9.4.1), failures remembered by place."""
+    """Return the reach learner: with the default predictor, and failures remembered by place.
+
+    `model`: transition model that the agent continues to learn (thesis 9.4.1).  `law`: "default" with today's robot, or "published" with
+    the robot of 2014.
+    """
     where = {"hands": hands(law), "jacobians": jacobians(law)}
     return LEARNERS["gp-ucb"].agent(space(law), plant, marker=MARKER, model=model, seed=seed, **where)
 
 
 def straight_paths(pairs: Sequence[tuple[int, int]], points: int = 21) -> Array:
-    """Return poses on the straight paths between pairs of states, (pairs, points, 4) rad."""
+    """Return `points` poses on the straight path between the samples of each pair of states, (pairs, points, 4) rad."""
     samples, shares = space().samples, np.linspace(0.0, 1.0, points)[:, None]
     found: Array = np.array([samples[a] + shares * (samples[b] - samples[a]) for a, b in pairs])
     return found
@@ -142,19 +179,22 @@ def straight_paths(pairs: Sequence[tuple[int, int]], points: int = 21) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Errors:
-    """Calibration errors: true minus measured motor angles (n,) rad, and true minus seen target positions (3,) m."""
+    """Calibration errors.
+
+    `turns`: (n,) rad, true minus measured motor angles.  `shift`: (3,) m, root frame, true minus seen position of the target.
+    """
 
     turns: Array
     shift: Array
 
 
 class JudgedPlant(WrappedPlant[OfflinePlant]):
-    """An offline plant with wrong encoders and eyes: control uses them, but the result of a reach is measured in the true poses.
+    """An offline plant with wrong encoders and eyes: control uses these, but the result of a reach is measured in the true poses.
 
     Args:
-        plant: the plant to drive.
-        errors: calibration errors of its encoders and eyes.
-        unseen: names of world objects that outcomes do not report.
+        plant: the plant that moves.
+        errors: calibration errors of its encoders and eyes; None: no errors.
+        unseen: names of world objects that are left out of the contacts in outcomes.
     """
 
     def __init__(self, plant: OfflinePlant, errors: Errors | None = None, unseen: Collection[str] = ()) -> None:
@@ -164,34 +204,40 @@ class JudgedPlant(WrappedPlant[OfflinePlant]):
         self._unseen = frozenset(unseen)
         self._target: ReachTarget | None = None
         self.reached: Array = np.full(3, np.nan)
-        """The true position of the marker at the end of the last reach, (3,) m."""
+        """The true position of the marker at the end of the last reach, (3,) m, root frame; NaN before the first reach."""
 
     @property
     def time(self) -> float:
-        """Plant time in s."""
+        """The time of the plant, s."""
         return self.inner.time
 
     @property
     def settings(self) -> dict[str, Any]:
-        """See Described."""
+        """The settings of the inner plant and the calibration errors, as JSON values (`mobee.plant.Described.settings`)."""
         errors = {"turns": self.errors.turns.tolist(), "shift": self.errors.shift.tolist()}
         return self.inner.settings | {"errors": errors, "unseen": sorted(self._unseen)}
 
     def act(self, part: str, target: Array) -> Outcome:
-        """See Plant."""
+        """Perform the action on the inner plant, as in `mobee.plant.Plant.act`; the outcome has no contacts with unseen objects."""
         return self._reported(super().act(part, target))
 
     def go(self, part: str, target: Array, marker: str) -> Outcome:
-        """Act, while the target exerts no force on the marker's hand, as in a reach: the planner plans around it."""
+        """Perform an action, as `act` does, but without a force of the target on the marker's hand.
+
+        The planner itself keeps the hand away from the target.
+        """
         return self._reported(self.inner.act(part, target, reaching=marker))
 
     def present(self, target: ReachTarget | None) -> None:
-        """See ReachPlant; the target is at its seen position."""
+        """Put the target into the world at its seen position, or move it there; None removes it, as in `mobee.reach.ReachPlant.present`."""
         self._target = target
         super().present(target)
 
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
-        """See ReachPlant; the outcome has the true position of the marker and the true remaining error."""
+        """Pull the marker to the presented target, as in `mobee.reach.ReachPlant.reach`.
+
+        The outcome has the true position of the marker and the true remaining error.  `stay`: the part stays where the reach ended.
+        """
         found = super().reach(part, marker, stay)
         self.reached = where = self.marker_at(marker, part, found.q)
         return replace(
@@ -199,11 +245,14 @@ class JudgedPlant(WrappedPlant[OfflinePlant]):
         )
 
     def missing(self, marker: str) -> float:
-        """Return the true distance of the marker from the target now, m."""
+        """Return the true remaining error of the marker now, m: its distance from the centre or surface of the target, at which it aims."""
         return self._true.missing(self.marker_at(marker))
 
     def marker_at(self, marker: str, part: str | None = None, q: Array | None = None) -> Array:
-        """Return the true position of the marker, (3,) m, now or with the part's encoders at q (n_part,) rad."""
+        """Return the true position of the marker, (3,) m, root frame.
+
+        `part`, `q`: a part and its encoder values (n_part,) rad, from which the position is computed; None: the present encoder values.
+        """
         whole = self.inner.q
         if part is not None and q is not None:
             whole[self.robot.part(part).slice] = q

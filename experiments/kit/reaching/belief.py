@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The model of robot and world that the planner peer uses: sound poses and motions, inverse kinematics, and RRT-Connect.
 
-Inverse kinematics by damped least squares with restarts, all of them at once (Wampler 1986); `kit.reaching.targets.nearest_pose` finds
-one nearest pose.  OMPL's RRT-Connect (Kuffner and LaValle 2000), and shortcuts of its paths (Geraerts and Overmars 2007).
+Inverse kinematics: damped least squares from many start poses, all at the same time (Wampler 1986); `kit.reaching.targets.nearest_pose`
+searches one nearest pose.  Paths: OMPL's RRT-Connect (Kuffner and LaValle 2000), and shortcuts of its paths (Geraerts and Overmars 2007).
 """
 
 from __future__ import annotations
@@ -24,19 +24,25 @@ from mobee.robot.robot import Clause
 STEP = 0.02  # of a motor's range, between two poses of a motion that are checked
 NEAR = 0.08  # of the motors' ranges: distance from a blocked pose within which poses count as blocked
 Care = Literal["grasping", "solids", "fields"]
-"""What must not touch anything: solids except the hand at the target; all solids; or also fields except the hand's at the target."""
+"""Contacts that are forbidden.
+
+"solids": all contacts of solids.  "grasping": these, but the hand may touch the target.  "fields": contacts of solids and of fields, but
+the hand's fields may touch the target.
+"""
 
 
 class PeerBelief:
-    """A planner's model; a pose is sound if it is within the limits, violates no known clause and touches nothing.
+    """A planner's model of robot and world.
+
+    A pose is sound if it is within the limits and away from blocked poses, violates no known clause, and has no forbidden contact.
 
     Args:
-        model: the robot in the world as believed; not edited by others.
-        motors: the d motors with which motions are planned; the others stay at home.
-        marker: the marker to bring to the target.
+        model: the robot in the world, as the planner believes it to be; other code must not edit it.
+        motors: names of the d motors with which motions are planned; all others stay at home.
+        marker: the marker that is brought to the target.
         clauses: the clauses that the planner knows.
         gains: gains of the law under which motions are executed.
-        turns: (d,) rad, believed minus measured angles of the motors.
+        turns: (d,) rad, believed minus measured angles of the motors; None: 0.
     """
 
     def __init__(
@@ -47,28 +53,28 @@ class PeerBelief:
         self.columns = np.array([robot.motor_index(name) for name in motors])
         width = np.array([gains.of_motors("limit_width", robot.motors)[i] for i in self.columns])
         self.limits: Array = robot.limits[self.columns] + width[:, None] * np.array([1.0, -1.0])
-        """(d, 2) rad, between which the joint limits exert no force."""
+        """(d, 2) rad, lowest and highest angles between which the joint limits exert no force."""
         self.range: Array = robot.limits[self.columns]
         """(d, 2) rad, limits of the motors."""
         self.span: Array = np.ptp(robot.limits[self.columns], axis=1)
-        """(d,) rad, widths of the ranges."""
+        """(d,) rad, widths of the motors' ranges."""
         self.turns = np.zeros(len(motors)) if turns is None else turns
         self.blocked: Array = np.zeros((0, len(motors)))
-        """(B, d) rad, poses to avoid."""
+        """(B, d) rad, poses to avoid: poses near them are not sound."""
         self.checked = 0
-        """Number of poses that were checked."""
+        """Number of poses that were checked so far."""
         self._clauses = tuple(clauses)
         self._exempt = self._hand()
 
     def present(self, target: ReachTarget) -> None:
-        """Put the target at its believed position."""
+        """Put the target into the believed world, in place of an earlier one."""
         world = self.model.world
         if TARGET in world.objects:
             world.remove(TARGET)
         world.add(TARGET, sphere(target.radius), position=target.position, role="target")
 
     def whole(self, q: Array) -> Array:
-        """Return the believed poses of the robot (..., n) for encoder readings (..., d) of the motors; rad."""
+        """Return the believed poses of the robot (..., n) rad for encoder readings q (..., d) rad of the motors that move."""
         home = self.model.robot.home
         poses = np.empty((*q.shape[:-1], len(home)))
         poses[...] = home
@@ -76,9 +82,9 @@ class PeerBelief:
         return poses
 
     def sound(self, q: Array, care: Care = "solids") -> NDArray[np.bool_]:
-        """Return which of the poses (P, d) rad are sound, (P,).
+        """Return which of the poses q (P, d) rad are sound, (P,).
 
-        A sound pose is within the limits and away from blocked poses, violates no clause and has no contact that `care` forbids.
+        A sound pose is within the limits and away from blocked poses, violates no clause, and has no contact that `care` forbids.
         """
         self.checked += len(q)
         poses = self.whole(q)
@@ -87,7 +93,10 @@ class PeerBelief:
         return good
 
     def sound_motion(self, start: Array, end: Array, care: Care = "solids") -> bool:
-        """Return whether the straight path between two poses (d,) rad is sound; its start is not checked."""
+        """Return whether all poses on the straight path between two poses (d,) rad are sound; the start pose is not checked.
+
+        `care`: the contacts that are forbidden.
+        """
         count = max(1, int(np.ceil(np.abs((end - start) / self.span).max() / STEP)))
         shares = np.arange(1, count + 1)[:, None] / count
         q = start + shares * (end - start)
@@ -116,7 +125,7 @@ class PeerBelief:
         return touching
 
     def push(self, q: Array) -> Array:
-        """Return the norms (P,) of the J^T forces of the fields in poses (P, d) rad while the marker reaches."""
+        """Return the norm of the fields' forces J^T f at the motors in each pose q (P, d) rad, (P,); the target does not push the hand."""
         size: Array = np.linalg.norm(self._evaluate(self.whole(q), reaching=True).projection[:, self.columns], axis=1)
         return size
 
@@ -145,10 +154,10 @@ RETREAT, CLEAR = 0.02, 0.2  # m, step away from the target, and largest distance
 def goals(
     belief: PeerBelief, target: ReachTarget, rng: np.random.Generator, most: int = MAX_POSES, free: bool = False
 ) -> tuple[Array, Array]:
-    """Return poses with the marker on the target, and for each a pose away from it, from which the hand moves straight to the target.
+    """Return poses with the marker on the target, and for each one a pose away from the target, (K, d) rad each, sorted by field forces.
 
-    Both are (K, d) rad.  At most `most` poses: those on which the forces of fields are smallest.  Poses in which the forces of joint limits
-    act are used only if there are no others, and never with `free`.
+    From the second pose the hand moves straight to the first.  `most`: largest number of poses; those with the smallest forces of fields
+    are returned.  Poses in which the forces of joint limits act are returned only if there are no others, and never with `free`.
     """
     within = target.radius if target.aim == "surface" else 0.0
     trials = ((belief.limits, ARRIVED), (belief.range, ARRIVED), (belief.range, ALMOST))
@@ -174,9 +183,10 @@ def goals(
 
 
 def approach(belief: PeerBelief, starts: Array, place: Array, within: float, limits: Array, steps: int = STEPS) -> tuple[Array, Array]:
-    """Move the marker from starts (K, d) rad to within a distance [m] of a place (3,) m, with the motors within limits (d, 2).
+    """Move the marker from poses `starts` (K, d) rad towards a place (3,) m, by damped least squares, all at the same time.
 
-    Returns the poses (K, d) rad, and their remaining errors (K,) m.
+    `within`: distance [m] from the place at which the marker has arrived.  `limits`: (d, 2) rad, of the motors.  `steps`: largest number of
+    steps.  Returns the poses (K, d) rad and their remaining errors (K,) m.
     """
     q = starts.copy()
     low, high = limits.T
@@ -194,7 +204,11 @@ def approach(belief: PeerBelief, starts: Array, place: Array, within: float, lim
 
 
 def retreat(belief: PeerBelief, pose: Array, place: Array) -> Array | None:
-    """Return the first pose on the marker's straight path out of the target in which no field is touched, else no solid; None without."""
+    """Return the first pose (d,) rad on the marker's straight path out of the target that is sound with the care "fields".
+
+    `pose`: (d,) rad, with the marker on the target.  `place`: (3,) m, centre of the target.  If no such pose is found within 0.2 m, the
+    first one that is sound with the care "solids" is returned; None if there is none either.
+    """
     whole = belief.whole(pose)
     here = belief.model.evaluate(whole).position(belief.marker)
     out = here - place
@@ -237,9 +251,10 @@ class _Careful(NamedTuple):
 def rrt_connect(
     belief: PeerBelief, start: Array, ends: Array, seed: int, care: Care = "solids", extensions: int = EXTENSIONS
 ) -> Array | None:
-    """Return the waypoints (k, d) rad of a sound path from a sound pose (d,) to one of the poses (G, d); None if none was found.
+    """Return the waypoints (k, d) rad of a sound path from a sound pose to one of several poses; None if none was found.
 
-    "Sound" is defined by `PeerBelief`.  Raises OmplMissing.
+    `PeerBelief` defines "sound".  `start`: (d,) rad.  `ends`: (G, d) rad.  `care`: the contacts that are forbidden.  `extensions`: largest
+    number of extensions of the trees.  Raises OmplMissing.
     """
     sound, sound_motion = partial(belief.sound, care=care), partial(belief.sound_motion, care=care)
     checker = _Careful(belief.range[:, 0], belief.span, belief.limits, sound, sound_motion)
@@ -247,9 +262,10 @@ def rrt_connect(
 
 
 def shortened(belief: PeerBelief, path: Array, rng: np.random.Generator, care: Care = "solids") -> Array:
-    """Return a path (k, d) rad shortened by straight motions that are sound.
+    """Return the path (k, d) rad with straight sound motions in place of detours.
 
-    They are tried between random points on the path, then from each waypoint as far as possible.  `care`: the contacts that are forbidden.
+    Straight motions are tried between random points on the path, then from each waypoint as far as possible.  `care`: the contacts that are
+    forbidden.
     """
     found = _straightened(belief, list(path), care)
     for _ in range(SHORTCUTS if len(found) > 2 else 0):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Random cases of reaching (thesis 5.3, 8.1, 8.2, 9.3), attempted by the planner alone, the reach alone, and both."""
+"""Random cases of reaching (thesis 5.3, 8.1, 8.2, 9.3), attempted with the planner alone, with the reach alone, and with both."""
 
 from __future__ import annotations
 
@@ -20,7 +20,11 @@ from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.reach import RADIUS, ReachTarget, reward_of
 
 SCENES = ("free", "around", "against", "between", "moving")
-"""Any start; the hand behind the target; the back of the hand at it; a ball between hand and target; a moving target."""
+"""The kinds of cases.
+
+"free": any start pose.  "around": the hand is behind the target.  "against": the back of the hand is at the target.  "between": a ball is
+between hand and target.  "moving": the target moves.
+"""
 OBSTACLE, BALL = "obstacle", 0.04  # m, radius
 MIN_GAP = 0.14  # m from the centre of the obstacle to those of palm and target
 MAX_BEHIND = 0.25  # m from the target to a hand behind it
@@ -33,9 +37,10 @@ MAX_DRAWS = 20_000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Case:
-    """A target and the start pose (4,) rad, with the position of an obstacle and the place to which the target moves, (3,) m.
+    """A case: a target and the start pose of the arm, `start` (4,) rad.
 
-    `to_and_fro`: the target moves back and forth and never stops.
+    `obstacle`: (3,) m, position of a ball; None: no ball.  `to`: (3,) m, position to which the target moves; None: it does not move.
+    `to_and_fro`: the target moves back and forth and never stops.  Positions are in the root frame.
     """
 
     target: ReachTarget
@@ -45,14 +50,14 @@ class Case:
     to_and_fro: bool = False
 
     def world(self) -> World:
-        """Return the world without the target."""
+        """Return a new world with the obstacle, if there is one, and without the target."""
         world = World()
         if self.obstacle is not None:
             world.add(OBSTACLE, sphere(BALL), position=self.obstacle)
         return world
 
     def target_at(self, seconds: float) -> Array:
-        """Return the position of the target a time after it was presented, (3,) m."""
+        """Return the position of the target, (3,) m, `seconds` after it was first presented."""
         if self.to is None:
             return self.target.position
         offset = self.to - self.target.position
@@ -62,12 +67,17 @@ class Case:
         return found
 
     def seen_at(self, seconds: float) -> ReachTarget:
-        """Return the target a time after it was first presented."""
+        """Return the target at its position `seconds` after it was first presented."""
         return replace(self.target, position=self.target_at(seconds))
 
 
 def make_cases(scene: str, count: int, seed: int, law: str = "default", free: bool = False) -> list[Case]:
-    """Draw cases of one of the SCENES with targets of `touchable_targets`; no solid touches anything in their start poses."""
+    """Draw `count` random cases of a kind; raises InvalidValue if too few are found.
+
+    The targets are those of `touchable_targets`.  In a start pose no solid touches anything.  `scene`: "free", "around", "against",
+    "between" or "moving", as explained at SCENES.  `law`: "default" with today's robot, or "published" with the robot of 2014.  `free`: in
+    the touching poses of the targets, no joint limit pushes.
+    """
     rng = np.random.default_rng([seed, 87, SCENES.index(scene)])
     targets, belief = touchable_targets(law, free), arm_belief(law=law)
     found: list[Case] = []
@@ -146,8 +156,8 @@ REACHES = {"published": 1, "default": 3}  # per case; the thesis reached once
 class Attempt:
     """The result of an attempt.
 
-    `missing`: distance from the target's surface to the palm [m].  `seconds`: plant time.  `thinking`: processor time for plans [s].
-    `reward`: thesis eq. 8.4, of the distance from the law's aim.
+    `missing`: distance of the palm from the target's surface at the end [m].  `seconds`: plant time.  `thinking`: processor time for plans
+    [s]. `reward`: thesis eq. 8.4, of the distance from the point at which the law aims (centre or surface).
     """
 
     missing: float
@@ -157,7 +167,11 @@ class Attempt:
 
 
 def trained(seed: int, transitions: int, tries: int, law: str = "default", free: bool = False) -> ReachAgent:
-    """Train a reach learner on the targets of `touchable_targets`, in an empty world."""
+    """Return a reach learner that was trained on the targets of `touchable_targets`, in an empty world.
+
+    `transitions`: number of transitions that are learned before.  `tries`: number of problem-tries.  `law`: "default" with today's robot,
+    or "published" with the robot of 2014.  `free`: in the touching poses of the targets, no joint limit pushes.
+    """
     plant = arm_plant(seed + 500, law=law)
     agent = reach_agent(plant, learned_transitions(plant, seed, transitions, law), seed, law)
     agent.learn(touchable_targets(law, free), tries)
@@ -165,9 +179,11 @@ def trained(seed: int, transitions: int, tries: int, law: str = "default", free:
 
 
 def attempt(method: str, agent: ReachAgent, case: Case, seed: int, motors: MotorParameters | None = None, law: str = "default") -> Attempt:
-    """Attempt a case from rest in its start pose: go to the best pre-reach state ("planner"), reach from the start ("reach"), or both.
+    """Attempt a case from rest in its start pose, and return the result.
 
-    A reach that misses is repeated, up to REACHES times in all.
+    `method`: "planner": move to a state with the palm near the target, without a reach; "reach": reach from the start; "both": move to the
+    best pre-reach state, then reach.  A reach that misses is repeated, up to REACHES times in all (1 for the law "published", 3 for
+    "default"). `agent`: the trained learner.  `seed`: of the plant and of choices.  `motors`: None: the default ones.
     """
     plant = begun(case, seed, motors, law)
     start = plant.time
@@ -193,7 +209,10 @@ def _missing(plant: OfflinePlant, case: Case, start: float) -> float:
 
 
 def begun(case: Case, seed: int, motors: MotorParameters | None = None, law: str = "default") -> OfflinePlant:
-    """Return a plant with the arm at rest in the start pose of a case."""
+    """Return a plant in the world of a case, without the target, with the arm at rest in the start pose.
+
+    `seed`: of the plant.  `motors`: None: the default ones.  `law`: "default" with today's robot, or "published" with the robot of 2014.
+    """
     plant = arm_plant(seed, case.world(), motors, law)
     place(plant, arm_belief(law=law).whole(case.start))
     return plant

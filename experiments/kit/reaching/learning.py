@@ -24,7 +24,10 @@ MAX_ACTIONS = 10  # of a try, its reach included
 
 @dataclass(frozen=True)
 class Learner:
-    """Predictor, strategy and memory of failures, named as in ReachAgent; `cost`: relative duration of a run."""
+    """The kind of a reach learner: names of predictor, strategy and memory of failures, as in `ReachAgent`.
+
+    `cost`: expected duration of a run, relative to the other learners.
+    """
 
     predictor: str
     strategy: str
@@ -32,7 +35,7 @@ class Learner:
     cost: float = 1.0
 
     def agent(self, *given: Any, **settings: Any) -> ReachAgent:
-        """Return an agent of this kind with other arguments of ReachAgent."""
+        """Return a `ReachAgent` of this kind; the arguments are its other arguments."""
         return ReachAgent(*given, predictor=self.predictor, strategy=self.strategy, failures=self.failures, **settings)
 
 
@@ -62,11 +65,11 @@ def learn(
     repetitions: int,
     sets: Mapping[str, Sequence[ReachTarget]],
 ) -> dict[str, Any]:
-    """Learn from the problems, and evaluate the agent on each of the named sets at the checkpoints, which are numbers of tries.
+    """Let an agent learn from `problems`, and evaluate it on each of the named `sets` at the `checkpoints`, which are numbers of tries.
 
-    Returns arrays.  For the T problem-tries: `problem`, `reach_state`, `reward`, `actions`, `duration` [s], each (T,), and `failures`
-    (S, A), the number of failures of each transition.  For each set, with L evaluations of R repetitions of P problems: `rewards_NAME`
-    and `states_NAME` (L, R, P), and `blocked_NAME` (L,), the number of failed transitions.
+    Returns arrays by name.  For the T problem-tries: `problem`, `reach_state`, `reward`, `actions`, `duration` [s], each (T,), and
+    `failures` (S, A), the number of failures of each transition.  For each set, with L evaluations of R = `repetitions` repetitions of P
+    problems: `rewards_NAME` and `states_NAME` (L, R, P), and `blocked_NAME` (L,), the number of failed transitions.
     """
     tries: list[Try] = []
     found: dict[str, list[Evaluation]] = {name: [] for name in sets}
@@ -84,7 +87,7 @@ def learn(
 
 
 def of_evaluations(name: str, evaluations: Sequence[Evaluation]) -> dict[str, Any]:
-    """Return the evaluations on the problem set `name` as the arrays that `learn` returns for it."""
+    """Return the arrays `rewards_NAME`, `states_NAME` and `blocked_NAME` of evaluations on the set `name`, as `learn` returns them."""
     return {
         f"rewards_{name}": np.array([one.rewards for one in evaluations]),
         f"states_{name}": np.array([one.states for one in evaluations], dtype=np.int16),
@@ -113,18 +116,19 @@ def _of_tries(tries: Sequence[Try], shape: tuple[int, ...]) -> dict[str, Any]:
 
 
 class Course:
-    """A single try by plans, as in an evaluation (thesis 8.3.3), on any plant and for any target, also a moving one; learns nothing.
+    """A single try by plans on any plant and for any target, also a moving one, as in an evaluation (thesis 8.3.3); learns nothing.
 
-    The part goes to the state with the highest expected reward of reaching.  Within the try, transitions that failed and states from
-    which reaches missed are avoided.
+    The part moves to the state with the highest expected reward of reaching.  Within the try, it avoids transitions that failed, and states
+    from which reaches missed.
 
     Args:
         plant: the robot.
         agent: the agent whose transition model and planning are used.
-        worth: returns the expected reward (S,) of reaching for a target (3,) m from each state.
-        where: returns the current position of the target, (3,) m.
-        rng: for ties between actions.
-        apart: distance, summed over the motors as shares of their ranges, within which states near one that missed are avoided too.
+        worth: function that returns the expected reward (S,) of reaching for a target (3,) m from each state.
+        where: function that returns the present position of the target, (3,) m, root frame.
+        rng: for the choice among equally good actions.
+        apart: after a missed reach, states within this distance of its state are avoided, too: the sum over the motors of the differences
+            as shares of their ranges.
     """
 
     def __init__(
@@ -142,12 +146,12 @@ class Course:
         self._spent = np.zeros(len(agent.space), dtype=bool)
         self._apart = apart
         self.actions = 0
-        """Number of transitions made."""
+        """Number of transitions made so far."""
         self.thinking = 0.0
-        """Processor time spent on plans, s."""
+        """Processor time spent on plans so far, s."""
 
     def go(self) -> None:
-        """Follow the plan to the state from which to reach, or until MAX_ACTIONS."""
+        """Follow the plan, which is renewed after each transition, until its next action is to reach, or for at most 9 transitions."""
         space = self._agent.space
         self._state = space.state_of(self._plant.measure(space.part))
         for _ in range(MAX_ACTIONS - 1):
@@ -166,7 +170,7 @@ class Course:
             self._state = following
 
     def missed(self) -> None:
-        """Avoid reaching from the current state in this try."""
+        """Record that a reach from the present state missed: in this try, reaches from it and from states near it are avoided."""
         space = self._agent.space
         spans = np.ptp(space.robot.limits[space.robot.part(space.part).slice][space.columns], axis=1)
         distances = np.abs(space.samples - space.samples[self._state]) / spans

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The planner that reach learners are compared with: inverse kinematics and RRT-Connect, executed through MoBeE.
+"""The planner with which reach learners are compared: inverse kinematics and RRT-Connect, executed through MoBeE.
 
-It plans with a belief about robot and world (belief.py), which may differ from the plant, and plans again on every change.  If a motion
-does not end as planned, the peer avoids that pose and plans again from where it is.  With memory it does so in later tries too: always,
-or for this target only if the target was touched, as thesis 9.4.1 distinguishes body and workspace.
+The planner has a belief about robot and world (`kit.reaching.belief`), which may differ from the plant, and it plans again after every
+change.  If a motion does not end as planned, the planner avoids that pose and plans again from where the arm is.  With a memory it avoids
+the pose in later tries, too: always, or, if the target was touched there, only for this target, as thesis 9.4.1 distinguishes body and
+workspace.
 """
 
 from __future__ import annotations
@@ -26,9 +27,10 @@ Knowledge = tuple[list[Array], dict[bytes, list[Array]]]
 
 
 class PeerMemory:
-    """Blocked poses of the motors, (d,) rad; those at which the target was touched count for this target only (thesis 9.4.1).
+    """The poses of the motors, (d,) rad, that the planner avoids, because motions were blocked there or reaches missed.
 
-    `span`: (d,) rad, widths of the motors' ranges.
+    Poses in which the target was touched, or with which the target was missed, are avoided only for this target, all others always (thesis
+    9.4.1).  `span`: (d,) rad, widths of the motors' ranges.
     """
 
     def __init__(self, span: Array) -> None:
@@ -40,11 +42,11 @@ class PeerMemory:
         return len(self._always) + sum(map(len, self._at_target.values()))
 
     def knowledge(self) -> Knowledge:
-        """Return the content of the memory, for `restore`."""
+        """Return a copy of the content of the memory, which `restore` accepts."""
         return list(self._always), {place: list(poses) for place, poses in self._at_target.items()}
 
     def restore(self, knowledge: Knowledge) -> None:
-        """Replace the content of the memory."""
+        """Replace the content of the memory by one that `knowledge` returned."""
         self._always, self._at_target = list(knowledge[0]), {place: list(poses) for place, poses in knowledge[1].items()}
 
     def clear(self) -> None:
@@ -52,7 +54,11 @@ class PeerMemory:
         self.restore(([], {}))
 
     def blocked(self, aim: Array, end: Array, target: ReachTarget, touched: bool) -> None:
-        """Record that a motion to `aim` ended elsewhere: avoid the next pose on its path, or its aim if that is nearer."""
+        """Record that a motion to the pose `aim` ended in another pose `end`, both (d,) rad.
+
+        The pose at a small distance ahead of `end` towards `aim` is avoided, or `aim` if it is nearer.  `touched`: whether the target was
+        touched; the pose is then avoided only for this target.
+        """
         left = (aim - end) / self._span
         ahead = end + min(1.0, NEAR / max(float(np.linalg.norm(left)), 1e-9)) * (aim - end)
         if touched:
@@ -61,18 +67,18 @@ class PeerMemory:
             self._always.append(ahead)
 
     def missed(self, pose: Array, target: ReachTarget) -> None:
-        """Avoid a pose when reaching for this target."""
+        """Record a pose (d,) rad that is to be avoided for this target only."""
         self._at_target.setdefault(place_of(target), []).append(pose)
 
     def of(self, target: ReachTarget) -> tuple[Array, Array]:
-        """Return the poses to avoid for this target, (B, d) rad: all, and those of this target only."""
+        """Return the poses to avoid for a target, (B, d) rad: first all of them, then those that are avoided for this target only."""
         here = self._at_target.get(place_of(target), [])
         everything, alone = (np.array(poses).reshape(-1, len(self._span)) for poses in (self._always + here, here))
         return everything, alone
 
 
 def place_of(target: ReachTarget) -> bytes:
-    """Return a key that is equal for targets at the same place."""
+    """Return a key of the target's position: targets at the same position have equal keys."""
     return target.position.tobytes()
 
 
@@ -81,9 +87,9 @@ ESCAPES = 64  # random poses, to get away from a contact
 
 
 class PeerPlans:
-    """Plans paths with one belief; keeps the goals of each target, and draws new ones if the avoided poses leave no path.
+    """Plans paths to targets with the planner's belief about robot and world.
 
-    `seed`: of random goals and paths.
+    The goal poses of each target are kept; new ones are drawn if the avoided poses leave no path.  `seed`: of random goals and paths.
     """
 
     def __init__(self, belief: PeerBelief, seed: int) -> None:
@@ -92,9 +98,11 @@ class PeerPlans:
         self._goals: dict[bytes, tuple[Array, Array]] = {}
 
     def path(self, target: ReachTarget, here: Array, memory: PeerMemory) -> tuple[Array, Array] | None:
-        """Return the corners of a path from a pose (d,) rad, the last one before the target, and the pose at the target; None without path.
+        """Return a path from the pose `here` (d,) rad to a target: its corners (k, d) rad, and the pose (d,) rad at the target.
 
-        If the avoided poses leave no path, new goals are drawn; then avoided poses are ignored, first those for all targets.
+        The last corner is the pose before the target, from which the hand moves straight to it.  If the poses that `memory` avoids leave no
+        path, new goal poses are drawn; then avoided poses are ignored, first those for all targets.  Returns None if there is still no
+        path.
         """
         belief = self._belief
         belief.present(target)
@@ -162,9 +170,9 @@ ENDS: tuple[Ended, ...] = ("there", "used up", "no plan")
 class PeerTry:
     """The result of a try.
 
-    `missing`: true remaining error, m.  `ended`: believed to be "there", with "no plan", or with the actions "used up" because motions
-    were blocked or the target moved.  `actions`, `plans`: their numbers.  `seconds`: plant time.  `planning`: processor time, s.
-    `checked`: number of poses checked.
+    `missing`: true remaining error, m.  `ended`: "there": the planner believes the marker at the target; "no plan": it found no path; "used
+    up": it made the largest number of actions, because motions were blocked or the target moved.  `actions`, `plans`: their numbers.
+    `seconds`: plant time.  `planning`: processor time, s.  `checked`: number of poses checked.
     """
 
     missing: float
@@ -177,44 +185,47 @@ class PeerTry:
 
 
 class PeerPlant(Protocol):
-    """The plant that the peer drives."""
+    """The interface of the plant that the planner moves."""
 
     @property
     def robot(self) -> Robot:
-        """The robot."""
+        """The robot of the plant."""
         ...
 
     @property
     def time(self) -> float:
-        """Plant time in s."""
+        """The time of the plant, s."""
         ...
 
     def measure(self, part: str) -> Array:
-        """See Plant."""
+        """Return the present encoder values of the part's motors, (n_part,) rad."""
         ...
 
     def go(self, part: str, target: Array, marker: str) -> Outcome:
-        """Act, while the target exerts no force on the marker's hand."""
+        """Set the part's attractor to `target` (n_part,) rad and wait until the part settles or times out.
+
+        Meanwhile the presented target exerts no force on the marker's hand.
+        """
         ...
 
     def present(self, target: ReachTarget | None) -> None:
-        """See ReachPlant."""
+        """Put the target into the world, or move it there; None removes it, as in `mobee.reach.ReachPlant.present`."""
         ...
 
     def missing(self, marker: str) -> float:
-        """Return the distance of the marker from its aim now, m."""
+        """Return the true remaining error of the marker now, m: its distance from the centre or surface of the target, at which it aims."""
         ...
 
 
 class PlannerPeer:
-    """Brings a marker to targets, one try after the other, each from the current pose.
+    """Brings a marker to targets by planning, one try after the other, each from the present pose.
 
     Args:
-        plant: the plant to move; motors that are not planned with keep their initial position.
-        belief: the model to plan with.
-        part: the part of the motors.
-        memory: the knowledge kept from earlier tries: "none", where motions were "blocked", or also which poses "missed" their target
-            although nothing blocked them.
+        plant: the plant that moves; motors that take no part in the planning keep their initial position.
+        belief: the model with which paths are planned.
+        part: name of the part of the motors.
+        memory: what is kept from earlier tries: "none": nothing; "blocked": where motions were blocked; "missed": also which poses missed
+            their target although nothing blocked the motion.
         seed: of random goals and paths.
         limit: largest number of actions per try.
     """
@@ -232,21 +243,21 @@ class PlannerPeer:
 
     @property
     def remembered(self) -> int:
-        """Number of poses that it avoids, for one or all targets."""
+        """The number of poses that the planner avoids, for one target or for all targets."""
         return len(self._known)
 
     def knowledge(self) -> Knowledge:
-        """Return the content of its memory, for `restore`."""
+        """Return a copy of the content of the memory, which `restore` accepts."""
         return self._known.knowledge()
 
     def restore(self, knowledge: Knowledge) -> None:
-        """Replace the content of its memory."""
+        """Replace the content of the memory by one that `knowledge` returned."""
         self._known.restore(knowledge)
 
     def try_problem(self, target: ReachTarget, sees: Callable[[], ReachTarget] | None = None) -> PeerTry:
-        """Present the target, go to it, and back to the pose before it.
+        """Present a target, move the marker to it, and move back to the pose before the target; returns the result.
 
-        `sees`: returns the target as it is seen now; called before each action; None: as presented.
+        `sees`: function that returns the target as it is seen now; it is called before each action.  None: the target does not move.
         """
         if self._memory == "none":
             self._known.clear()

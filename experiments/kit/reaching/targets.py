@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The targets of the thesis: 27 spheres of 10 cm on a grid that roughly covers the workspace of the right arm (thesis 8.3, fig. 8.1).
+"""The targets of the thesis: 27 spheres, 10 cm in diameter, on a grid that roughly covers the right arm's workspace (thesis 8.3, fig. 8.1).
 
     python -m experiments.kit.reaching.targets
 
 prints which of them inverse kinematics can reach; the table is in README.md of this folder.
 
-The figure gives no coordinates.  The original's program draws targets from x -0.4 to -0.1, y 0 to 0.4 and z 0 to 0.4 m in steps of 0.1,
-in the root frame: x is negative in front of the robot, y positive to its right, z positive upwards.  The places here are every second
-of those in y and z, and all in x except the farthest, which only the stretched arm reaches.
+The figure gives no coordinates.  The original's program draws targets from x -0.4 to -0.1, y 0 to 0.4 and z 0 to 0.4 m in steps of 0.1, in
+the root frame: x is negative in front of the robot, y positive to its right, z positive upwards.  The grid here has every second of these
+values of y and z, and all values of x except the farthest, which only the stretched arm reaches.
 """
 
 from __future__ import annotations
@@ -34,17 +34,17 @@ X, Y, Z = (-0.3, -0.2, -0.1), (0.0, 0.2, 0.4), (0.0, 0.2, 0.4)  # m
 
 
 def grid() -> Array:
-    """Return the 27 places, (27, 3) m, root frame; z changes fastest, x slowest."""
+    """Return the 27 positions of the grid, (27, 3) m, root frame; z changes fastest, x slowest."""
     return np.array(list(product(X, Y, Z)))
 
 
 def between() -> Array:
-    """Return the centres of the eight cells of the grid, (8, 3) m: targets that no learner tries."""
+    """Return the centres of the eight cells of the grid, (8, 3) m, root frame: positions of targets that no learner tries."""
     return np.array(list(product(*((np.array(levels[1:]) + levels[:-1]) / 2.0 for levels in (X, Y, Z)))))
 
 
 def targets_at(places: Array, aim: Aim = "centre") -> list[ReachTarget]:
-    """Return spheres of 10 cm at places (P, 3) m."""
+    """Return spheres as targets, with the default radius (5 cm), at `places` (P, 3) m, root frame."""
     return [ReachTarget(place, aim=aim) for place in places]
 
 
@@ -54,7 +54,7 @@ SLACK = 1e-6  # rad, allowed violation of a clause
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Nearest:
-    """The pose (n,) rad that brings the marker nearest to a place, and the remaining distance, m."""
+    """The pose q (n,) rad that brings a marker nearest to a place, and the remaining distance, m."""
 
     q: Array
     distance: float
@@ -63,10 +63,11 @@ class Nearest:
 def nearest_pose(
     model: Model, marker: str, place: Array, joints: Sequence[str], restarts: int = RESTARTS, seed: int = 0, good: float = 1e-5
 ) -> Nearest:
-    """Return the pose nearest to a place (3,) m by least squares (SLSQP) from random poses; stops at the first within `good` m.
+    """Return the pose that brings the marker nearest to a place (3,) m, root frame, by least squares (SLSQP) from random poses.
 
-    It uses kinematics only.  The named motors move within their limits, the others are at home; unlike in
-    `mobee.roadmap.reachable`, the clauses of their part hold.
+    Contacts are ignored.  The motors `joints` move within their limits, all others are at home.  The clauses of their part hold, unlike in
+    `mobee.roadmap.reachable`.  `restarts`: number of start poses.  `good`: m, distance at which the search ends.  If no start pose gives a
+    pose that satisfies the clauses, the result is home with an infinite distance.
     """
     from scipy.optimize import minimize  # 0.3 s, and only this needs it
 
@@ -120,26 +121,34 @@ AT_CENTRE = 2e-3  # m within which the palm counts as at the centre
 
 
 def joints_of(count: int) -> tuple[str, ...]:
-    """Return the first motors of the right arm: 4 are those of the lattice, 7 are all without the hand."""
+    """Return the names of the first `count` motors of the right arm: 4 are those of the lattice, 7 are all but those of the hand."""
     return robot().parts[PART].motors[:count]
 
 
 def distances(places: Array, joints: tuple[str, ...]) -> list[float]:
-    """Return the least distance [m] of the palm from each place (P, 3) m, within limits and cable constraints; contacts are ignored."""
+    """Return the least distance [m] of the right palm from each place (P, 3) m, within limits and cable constraints.
+
+    Contacts are ignored.  `joints`: names of the motors that move.
+    """
     model = Model(robot())
     return [nearest_pose(model, MARKER, place, joints, good=AT_CENTRE / 10.0).distance for place in places]
 
 
 def counts(found: list[float]) -> tuple[int, int]:
-    """Return the number of targets whose centre the palm can reach, and the number whose surface it can reach within 2 cm."""
+    """Return how many targets have a centre that the palm can reach, and how many a surface that it can reach within 2 cm.
+
+    `found`: least distance of the palm from the centre of each target, m.
+    """
     return sum(d <= AT_CENTRE for d in found), sum(d <= RADIUS + GOOD for d in found)
 
 
 @cache
 def touchable_targets(law: str = "default", free: bool = True) -> tuple[ReachTarget, ...]:
-    """Return 27 targets that the palm can touch in an empty world: from the thesis' 27, and others drawn between them.
+    """Return 27 targets that the right palm can touch in an empty world.
 
-    In the touching pose only the hand's solid is in the target, cable constraints hold, and, if `free`, no joint limit pushes.
+    These are the thesis' targets that it can touch, and random ones within the same box in place of the others.  In the touching pose only
+    the hand's solid is in the target, cable constraints hold, and, if `free`, no joint limit pushes.  `law`: "default" with today's robot,
+    or "published" with the robot of 2014.
     """
     belief, rng, places, aim = arm_belief(law=law), np.random.default_rng(27), grid(), laws()[law].aim
     found = [target for target in targets_at(places, aim) if touchable(belief, target, free)]
@@ -150,14 +159,14 @@ def touchable_targets(law: str = "default", free: bool = True) -> tuple[ReachTar
 
 
 def touchable(belief: PeerBelief, target: ReachTarget, free: bool = True) -> bool:
-    """Return whether the palm can touch a target according to a belief; `free`: in a pose in which no joint limit pushes."""
+    """Return whether the marker of a belief can touch the surface of a target; `free`: in a pose in which no joint limit pushes."""
     to_surface = replace(target, aim="surface")
     belief.present(to_surface)
     return len(goals(belief, to_surface, np.random.default_rng(0), most=1, free=free)[0]) > 0
 
 
 def table() -> str:
-    """Return the table of the distances of all targets, and the numbers that can be reached."""
+    """Return a Markdown table of the distances of all targets, and one of the numbers of targets that can be reached."""
     lines = ["| joints | targets | palm at the centre | palm within 2 cm of the surface |", "| --- | --- | --- | --- |"]
     each = {}
     for count in (len(RIGHT), 7):

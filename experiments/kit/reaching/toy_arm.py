@@ -3,11 +3,12 @@
 
     python -m experiments.kit.reaching.toy_arm --seeds 3 --only gp
 
-Two links on a shoulder of three joints, with the ranges of the iCub.  A reach moves the hand to the target by damped least squares, by at
-most half a radian per joint; its start pose is noisy.  Targets are balls, and most actions that sweep through one fail.
+The arm has two links on a shoulder of three joints, with the ranges of the iCub.  A reach moves the hand to the target by damped least
+squares, by at most half a radian per joint; its start pose is noisy.  Targets are balls, and most actions whose path passes through the
+target fail.
 
-The command prints a table by predictor and strategy.  Each row: the rewards of an evaluation on the 27 targets as a fraction of the
-oracle's, after each number of problem-tries; the same on eight targets between them that are never tried, after 800; the learning time.
+The command prints a table by predictor and strategy.  Each row has the rewards of an evaluation on the 27 targets as a fraction of the
+oracle's, after each number of problem-tries; the same on eight targets between them that are never tried, after 800; and the learning time.
 """
 
 from __future__ import annotations
@@ -40,13 +41,19 @@ LEAVE_MARGIN = 0.005  # m: an arm already near the target may leave it
 
 
 def hands(poses: Array) -> Array:
-    """Return the palm positions (..., 3) m from the shoulder at poses (..., 4) rad: shoulder pitch, roll, yaw, elbow."""
+    """Return the positions of the palm, (..., 3) m from the shoulder, in poses (..., 4) rad: shoulder pitch, roll, yaw, elbow.
+
+    x points forward, y outward, z up.
+    """
     upper, fore = _links(poses)
     return upper + fore
 
 
 def missing(starts: Array, target: Array, ranges: Array) -> Array:
-    """Return the remaining errors (...) m of reaches for a target (3,) m from poses (..., 4) rad within ranges (4, 2) rad."""
+    """Return the remaining errors (...) m of reaches for a target (3,) m, relative to the shoulder.
+
+    `starts`: (..., 4) rad, poses in which the reaches start.  `ranges`: (4, 2) rad, of the joints.
+    """
     low, high = np.maximum(starts - MAX_REACH, ranges[:, 0]), np.minimum(starts + MAX_REACH, ranges[:, 1])
     q = np.clip(starts, low, high)
     for _ in range(STEPS):
@@ -59,15 +66,15 @@ def missing(starts: Array, target: Array, ranges: Array) -> Array:
 
 
 def jacobians(poses: Array) -> Array:
-    """Return the derivatives of the palm position, (..., 3, 4), by central differences."""
+    """Return the derivatives of the palm's position by the joints in poses (..., 4) rad, (..., 3, 4) m/rad, by central differences."""
     step = 1e-6
     return np.stack([(hands(poses + step * unit) - hands(poses - step * unit)) / (2.0 * step) for unit in np.eye(4)], axis=-1)
 
 
 def swept(starts: Array, ends: Array, point: Array, clearance: float) -> NDArray[np.bool_]:
-    """Return (S, A) whether the arm comes within a clearance [m] of a point (3,) m, and nearer than at the start.
+    """Return which straight motions bring the arm within `clearance` [m] of a point (3,) m, and nearer than at the start, (S, A).
 
-    The paths are straight, from poses (S, 4) to (S, A, 4) rad.
+    `starts`: (S, 4) rad.  `ends`: (S, A, 4) rad.  The point is relative to the shoulder.
     """
     shares = np.linspace(0.0, 1.0, WAYPOINTS)[:, None]
     upper, fore = _links(starts[:, None, None] + shares * (ends - starts[:, None])[:, :, None])
@@ -108,26 +115,32 @@ SURE_FAILURES = 20  # failures after which an action is not tried again
 
 
 class ToyArm(ReachTable):
-    """The lattice of the right arm, 81 states, with the reaches of the toy arm."""
+    """The lattice of the right arm, 81 states, as a `mobee.learning.reaching.tabular.ReachTable` with the reaches of the toy arm.
+
+    `seed`: of the random outcomes.  `start`: the first state.
+    """
 
     def __init__(self, seed: int = 0, start: int = 0) -> None:
         space = toy_space()
         super().__init__(space, *ideal(space), self._of, seed=seed, start=start)
         self.hands: Array = hands(space.samples)
-        """(S, 3) m, from the shoulder."""
+        """(S, 3) m from the shoulder, position of the palm in each state."""
         self.jacobians: Array = jacobians(space.samples)
-        """(S, 3, 4) m/rad, Jacobians of the hand."""
+        """(S, 3, 4) m/rad, derivatives of `hands` by the joints."""
         self._starts = Draws("toy arm")
         self._place: Array = np.empty(3)
 
     def present(self, target: ReachTarget | None) -> None:
-        """Put the target into the world; None removes it."""
+        """Put the target into the world, or move it there; None removes it, as in `mobee.reach.ReachPlant.present`."""
         super().present(target)
         if target is not None:
             self._place = target.position
 
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
-        """Return the outcome of a reach from one of the start poses."""
+        """Return the outcome of a reach for the presented target, from one of 8 noisy start poses in the present state.
+
+        As in `mobee.reach.ReachPlant.reach`; raises InvalidValue if no target is presented.
+        """
         if self._presented is None:
             raise InvalidValue("nothing to reach for: present a target first.")
         start = int(self._starts.at(self.seed, self.actions).integers(STARTS))
@@ -140,37 +153,37 @@ class ToyArm(ReachTable):
 
 
 class Truth:
-    """A predictor that knows the mean rewards of the toy arm."""
+    """A predictor that returns the true mean rewards of the toy arm."""
 
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:
-        """Learn nothing."""
+        """Do nothing: the rewards are known already."""
 
     def mean(self, target: Array) -> Array:
-        """Return the mean rewards, shape (S,)."""
+        """Return the true mean reward of reaching for a target (3,) m from each state, (S,)."""
         return true_rewards(target)
 
     def deviation(self, target: Array) -> Array:
-        """Return zeros (S,)."""
+        """Return zeros (S,): nothing is uncertain."""
         return np.zeros(len(toy_space()))
 
     def sample(self, target: Array, rng: np.random.Generator) -> Array:
-        """Return the mean rewards, shape (S,)."""
+        """Return the true mean reward of reaching for a target (3,) m from each state, (S,)."""
         return true_rewards(target)
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The name of the predictor."""
+        """The name of the predictor, as a dict of JSON values."""
         return {"name": "truth"}
 
 
 def toy_agent(arm: ToyArm, seed: int, predictor: Any, strategy: str, failures: str) -> ReachAgent:
-    """Return an agent on a toy arm."""
+    """Return a `ReachAgent` on a toy arm; `predictor`, `strategy` and `failures` are its arguments of these names."""
     kind = Learner(predictor, strategy, failures)
     return kind.agent(arm.space, arm, arm, marker=MARKER, seed=seed, hands=arm.hands, jacobians=arm.jacobians)
 
 
 def oracle(targets: list[ReachTarget], seed: int = 0) -> ReachAgent:
-    """Return an agent on its own toy arm that knows all mean rewards and blocked actions, and learns nothing."""
+    """Return an agent that knows all mean rewards and the actions that `targets` block, on its own toy arm; it is only to be evaluated."""
     agent = toy_agent(ToyArm(seed), seed, Truth(), "greedy", "local")
     for target in targets:
         for state, action in np.argwhere(blocked(target.position)).tolist():
@@ -181,19 +194,19 @@ def oracle(targets: list[ReachTarget], seed: int = 0) -> ReachAgent:
 
 @cache
 def toy_space() -> Lattice:
-    """Return the 81 states of the four joints of the right arm."""
+    """Return the 81 states of the four joints of the right arm; every call returns the same object."""
     return arm_space(joints=RIGHT)
 
 
 def true_rewards(target: Array) -> Array:
-    """Return the mean rewards of reaching from each state, (S,)."""
+    """Return the true mean reward of reaching for a target (3,) m, relative to the shoulder, from each state, (S,)."""
     rewards: Array = np.vectorize(reward_of)(_missing(target.tobytes()))
     mean: Array = rewards.mean(axis=1)
     return mean
 
 
 def blocked(target: Array) -> NDArray[np.bool_]:
-    """Return which actions a target blocks, (S, A)."""
+    """Return which actions a target at (3,) m, relative to the shoulder, blocks, (S, A)."""
     space = toy_space()
     found: NDArray[np.bool_] = swept(space.samples, space.samples[space.goals], target, CLEARANCE) & (space.goals >= 0)
     return found
@@ -201,7 +214,7 @@ def blocked(target: Array) -> NDArray[np.bool_]:
 
 @cache
 def grid() -> list[ReachTarget]:
-    """Return 27 targets at quantiles of the hand positions, three in each direction."""
+    """Return 27 targets: three x, three y and three z, which are quantiles of the palm positions in random poses."""
     low, high = _ranges().T
     reached = hands(np.random.default_rng(0).uniform(low, high, size=(4000, 4)))
     axes = np.quantile(reached, QUANTILES, axis=0).T
@@ -209,7 +222,7 @@ def grid() -> list[ReachTarget]:
 
 
 def cell_centres() -> list[ReachTarget]:
-    """Return eight targets that no learner tries: the centres of the cells of the grid."""
+    """Return eight targets that no learner tries: the centres of the cells between the 27 targets of `grid`."""
     cube = np.array([target.position for target in grid()]).reshape(3, 3, 3, 3)
     corners = [(i, j, k) for i in (0, 1) for j in (0, 1) for k in (0, 1)]
     return [ReachTarget(cube[i : i + 2, j : j + 2, k : k + 2].mean(axis=(0, 1, 2))) for i, j, k in corners]
@@ -258,7 +271,11 @@ ROWS = (
 
 
 def scores(predictor: str, strategy: str, failures: str, seed: int, checkpoints: Sequence[int] = CHECKPOINTS) -> tuple[Array, float]:
-    """Return rewards as fractions of the oracle's at the checkpoints, and on targets never tried (NaN before UNSEEN_AFTER)."""
+    """Return the rewards of a learner as fractions of the oracle's: on the 27 targets at each checkpoint, and on eight that it never tries.
+
+    `predictor`, `strategy`, `failures`: of the learner, as in `ReachAgent`.  `checkpoints`: numbers of problem-tries.  The second result is
+    measured after 800 problem-tries; NaN if this is no checkpoint.
+    """
     problems, unseen = grid(), np.nan
     agent = toy_agent(ToyArm(seed), seed, predictor, strategy, failures)
     found = []
@@ -276,7 +293,7 @@ def _fraction(agent: ReachAgent, problems: list[ReachTarget], repetitions: int) 
 
 
 def main() -> None:
-    """Print the table."""
+    """Print the table of the scores of all learners, with the options of the command line."""
     parser = argparse.ArgumentParser(description="Scores of learners on the toy arm, by predictor and strategy.")
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--most", type=int, default=CHECKPOINTS[-1], help="problem-tries")

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """True rewards of reaches and transitions blocked by targets, measured on the plant, and the oracle that plans with them.
 
-Every reach and every transition is tried several times on the offline plant, each from where the last action ended.  A state that
-needs more tries is entered with the target in place if a try ends there, otherwise without the target.
+Every reach and every transition is tried several times on the offline plant, each from where the last action ended.  If a try with the
+target in place ends in a state that needs more tries, these are made next; all other states are entered without the target.
 
 The oracle is an agent that plans and is evaluated like the learners, with the same discount, model of free transitions and limit of
-actions.  But it knows the mean rewards and the blocked transitions.  Its score is an upper bound for learners; it can be exceeded by
-chance, and slightly by an agent that knows how transitions fail.
+actions.  But it knows the mean rewards and the blocked transitions.  Its score is an upper bound for learners.  A learner can exceed it by
+chance, and slightly if it knows how transitions fail.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ BLOCKED = 0.5  # share of failed tries from which a transition counts as blocked
 class Tried:
     """Measured results of one target.
 
-    `missing`: (S, n) m, remaining errors of the tries to reach from each state.  `made`, `failed`: (S, A) number of tries of each
-    transition, and of those that did not end in its goal.
+    `missing`: (S, n) m, remaining errors of n tries to reach from each state; NaN for tries that were not made.  `made`, `failed`: (S, A),
+    number of tries of each transition, and of those that did not end in its goal.
     """
 
     missing: Array
@@ -47,16 +47,16 @@ class Tried:
     failed: Ints
 
     def values(self) -> dict[str, Any]:
-        """Return the results as the values of a cell."""
+        """Return the results by field, as the values of a cell (one run of a sweep)."""
         return {"missing": self.missing, "made": self.made, "failed": self.failed}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Truth:
-    """Measured results of several targets.
+    """Measured results of T targets.
 
-    `places`: (T, 3) m.  `missing`: (T, S, n) m, NaN where a state was not entered.  `blocked`: (T, S, A) share of failures, NaN without
-    tries.
+    `places`: (T, 3) m, root frame.  `missing`: (T, S, n) m, remaining errors of n tries to reach; NaN where a state was not entered.
+    `blocked`: (T, S, A), share of the tries of each transition that failed; NaN without tries.
     """
 
     places: Array
@@ -64,7 +64,10 @@ class Truth:
     blocked: Array
 
     def rewards(self, scale: float) -> Array:
-        """Return the mean reward of reaching from each state, (T, S) (thesis eq. 8.4); 0 where the state was not entered."""
+        """Return the mean reward of reaching from each state, (T, S) (thesis eq. 8.4); 0 where the state was not entered.
+
+        `scale`: unit of the remaining error in the reward, m.
+        """
         found = 1.0 / (1.0 + self.missing / scale)
         tried = np.isfinite(found)
         mean: Array = np.where(tried, found, 0.0).sum(axis=-1) / np.maximum(tried.sum(axis=-1), 1)
@@ -76,13 +79,13 @@ class Truth:
 
 
 def load_truth(path: Path) -> Truth:
-    """Read a file written by `Truth.save`."""
+    """Return the results in a .npz file that `Truth.save` wrote."""
     with np.load(path) as file:
         return Truth(file["places"], file["missing"], file["blocked"])
 
 
 def truth_of(measured: Mapping[tuple[float, ...], Mapping[str, Any]]) -> Truth:
-    """Combine the measured values of cells, by place of the target."""
+    """Return the results of several targets from the values of their cells (`Tried.values`), by position of the target."""
     each = list(measured.values())
     made = np.array([one["made"] for one in each])
     with np.errstate(invalid="ignore"):
@@ -91,7 +94,10 @@ def truth_of(measured: Mapping[tuple[float, ...], Mapping[str, Any]]) -> Truth:
 
 
 def measure(place: Array, law: str = "published", tries: int = TRIES, seed: int = SEED) -> Tried:
-    """Try every reach and every transition `tries` times with the target at a place (3,) m."""
+    """Try every reach and every transition `tries` times, with the target at a place (3,) m, root frame, and return the results.
+
+    `law`: "published" or "default"; the robot is that of 2014.  `seed`: of the plant and of random choices.
+    """
     target = ReachTarget(place, aim=laws()[law].aim)
     return _Measuring(reach_space(), reach_plant(seed, law), target, tries, seed).run()
 
@@ -150,7 +156,7 @@ class _Measuring:
 
 
 class Known:
-    """A predictor that returns the true mean rewards (S,) of each measured target."""
+    """A predictor that returns the true mean rewards (S,) of each measured target; `scale`: unit of the remaining error, m."""
 
     def __init__(self, truth: Truth, scale: float) -> None:
         self._rewards: dict[bytes, Array] = dict(
@@ -159,17 +165,20 @@ class Known:
         self.settings: dict[str, Any] = {"name": "known", "scale": scale}
 
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:
-        """Learn nothing."""
+        """Do nothing: the rewards are known already."""
 
     def mean(self, target: Array) -> Array:
-        """Return the true mean rewards (S,); raises InvalidValue for a target that was not measured."""
+        """Return the true mean reward of reaching for a target (3,) m from each state, (S,).
+
+        Raises InvalidValue for a target that was not measured.
+        """
         rewards = self._rewards.get((np.asarray(target, dtype=np.float64) + 0.0).tobytes())
         if rewards is None:
             raise InvalidValue(f"the target at {target} m was not measured: measure it first.")
         return rewards
 
     def deviation(self, target: Array) -> Array:
-        """Return zeros: nothing is uncertain."""
+        """Return zeros (S,): nothing is uncertain."""
         return np.zeros_like(self.mean(target))
 
     def sample(self, target: Array, rng: np.random.Generator) -> NoReturn:
@@ -178,7 +187,11 @@ class Known:
 
 
 def oracle(truth: Truth, space: Space, plant: OfflinePlant, beliefs: OutcomeModel, marker: str, scale: float, seed: int) -> ReachAgent:
-    """Return an agent with true rewards and true failures, to be evaluated on measured targets."""
+    """Return an agent that knows the true rewards and the blocked transitions; it is to be evaluated on the measured targets.
+
+    `truth`: the measured results.  `beliefs`: transition model without targets.  `scale`: unit of the remaining error in the reward, m. A
+    transition counts as blocked if at least half of its tries failed.
+    """
     known = Known(truth, scale)
     agent = ReachAgent(space, plant, beliefs, marker=marker, predictor=known, strategy="greedy", failures="local", scale=scale, seed=seed)
     for place, blocked in zip(truth.places, truth.blocked, strict=True):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Starts the client: `python -m experiments.claims.ch4_reflex.babbler`."""
+"""Starts the babbler, a client that sends random commands: `python -m experiments.claims.ch4_reflex.babbler`."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from services.common.service import Service
 
 
 class BabblerNode:
-    """Commands one posture after the other, logs every command, and answers every tick, until the system ends."""
+    """Commands random postures one after the other, logs every command that has ended, and answers every tick of lockstep."""
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:
         self._commands = 0
@@ -50,7 +50,7 @@ class BabblerNode:
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Send random commands until the robot time is over."""
+    """Run the client until the system ends.  `argv`: command-line arguments; None: those of the process."""
     config = load_config(Config, argv, "experiments.claims.ch4_reflex.babbler")
     with explained("experiments.claims.ch4_reflex.babbler"):
         robot = load_robot(config.robot)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Settings of the babbler."""
+"""Settings of the babbler, the client of `babbling` that sends random commands."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from services.common.session import NAMESPACE
 
 
 class Config(ServiceConfig, frozen=True, kw_only=True):
-    """The babbler's settings; `seed` decides the postures."""
+    """Settings of the babbler; its `seed` determines the sequence of random postures."""
 
     at: Literal["drives", "goals"] = "drives"
-    """Target of the commands: the drives of the robot, or the goals of the controller."""
+    """What is commanded: "drives", the motors of the robot, or "goals", the attractors of the controller."""
     robot_of: Annotated[str, Meta(pattern="^[a-z0-9_]+$")] = NAMESPACE
-    """Namespace of the commanded robot: that of the robot, or of a filter in front of it."""
+    """Namespace of the commanded robot: that of the robot itself, or of a filter in front of it."""
     speed: Annotated[float, Meta(gt=0, le=1)] = 0.2
-    """Share of the motors' top speed for moves at the drives; the controller has its own setting."""
+    """Share of the motors' maximum speed for moves at the drives, in (0, 1]; for goals the controller's own setting counts."""
     run_dir: str = ""
-    """Folder of commands.jsonl."""
+    """Folder in which the client writes its commands, as commands.jsonl."""

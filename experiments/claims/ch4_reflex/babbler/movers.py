@@ -25,7 +25,10 @@ _M = TypeVar("_M", bound=Message)
 
 
 class PartStreams(Generic[_M]):
-    """The newest message of each part; in lockstep that of the current tick."""
+    """The newest message of one class from each part; in lockstep that of the current tick.
+
+    `newest`: the messages, by part.  `cls`: the class of message.  A new run removes all messages.
+    """
 
     def __init__(self, service: Service, robot: Robot, cls: type[_M]) -> None:
         self.newest: dict[str, _M] = {}
@@ -35,7 +38,7 @@ class PartStreams(Generic[_M]):
         service.on_run(self.newest.clear)
 
     def are_complete(self) -> bool:
-        """Return whether every part has sent a message in this run."""
+        """Whether every part has sent a message in this run."""
         return len(self.newest) == self._parts
 
     def _noter(self, part: str) -> Callable[[_M], None]:
@@ -46,10 +49,16 @@ class PartStreams(Generic[_M]):
 
 
 class AtDrives:
-    """Sends position commands to the drives every tick, along moves from posture to posture."""
+    """Sends position commands to the drives of all parts in every tick, along minimum-jerk moves from posture to posture.
+
+    If the safety layer ends a move, all parts are armed again, and the next move begins where the robot is.
+    """
 
     def __init__(self, service: Service, robot: Robot, targets: Targets, speed: float, note: Callable[[Commanded], None]) -> None:
-        """`speed`: share of the motors' top speed; `note` is called with every command that has ended."""
+        """`targets`: the random postures.
+
+        `speed`: share of the motors' maximum speed.  `note` is called with every command that has ended.
+        """
         self._service, self._robot, self._targets, self._note = service, robot, targets, note
         self._speed = speed * np.array([motor.max_velocity for motor in robot.motor_table])
         self._states = PartStreams(service, robot, State)
@@ -63,7 +72,7 @@ class AtDrives:
         service.on_run(self._forget)
 
     def move(self, k: int, dt: float) -> None:
-        """Send the commands of tick k, of length dt [s]."""
+        """Send the position commands of tick `k`.  `dt`: duration of a tick [s].  If a part is not armed, arm all parts instead."""
         if not self._states.are_complete():
             return
         states = self._states.newest
@@ -116,10 +125,10 @@ class AtDrives:
 
 
 class AtGoals:
-    """Sends goals to the controller; the next posture follows when every part has settled or timed out."""
+    """Sends postures as goals to the controller; the next posture follows when the motion of every part has ended."""
 
     def __init__(self, service: Service, robot: Robot, targets: Targets, note: Callable[[Commanded], None]) -> None:
-        """`note` is called with every command that has ended."""
+        """`targets`: the random postures.  `note` is called with every command that has ended."""
         self._service, self._robot, self._targets, self._note = service, robot, targets, note
         self._motions = PartStreams(service, robot, Motion)
         self._epochs: dict[str, int] = {}
@@ -129,7 +138,7 @@ class AtGoals:
         service.on_run(self._forget)
 
     def move(self, k: int, dt: float) -> None:
-        """Send the goals of tick k, of length dt [s]."""
+        """Send the goals of the next posture in tick `k`, if every part has ended its motion.  `dt`: duration of a tick [s], not used."""
         if not self._motions.are_complete() or not self._owns_all():
             return
         if self._begin >= 0:

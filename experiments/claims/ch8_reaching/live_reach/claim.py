@@ -84,7 +84,12 @@ PERFORM = "experiments.claims.ch8_reaching.live_reach.contestants:perform"
 
 @dataclass(frozen=True)
 class Sizes:
-    """The sizes of a start: transitions, offline and live tries, and targets of each kind."""
+    """The sizes of one start of the experiment, a learner with its tries.
+
+    `transitions`: curious transitions before the first target.  `tries`: offline tries of the 27 targets.  `live`: live tries while the
+    learner still learns.  Targets that are tried without learning: `grid`, of the thesis; `fresh`, new ones; `moving`, new ones that move,
+    and as many with a moving obstacle.  `timed`: reaches whose first motion is timed.
+    """
 
     transitions: int = TRANSITIONS
     tries: int = TRIES
@@ -99,7 +104,7 @@ QUICK = Sizes(500, 30, 2, 2, 2, 1, 2)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add --starts, --quick and --backend."""
+    """Add the options --starts, --quick and --backend."""
     add_backend(parser)
     parser.add_argument(
         "--starts", type=positive_whole, default=3, metavar="N", help="learners, each with other poses and new targets (default: 3)"
@@ -108,7 +113,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Train, refine and evaluate; finished blocks are not repeated.  Raises OmplMissing before the first."""
+    """Train the learners offline, refine them live, let all contestants try, and return the results.
+
+    Blocks of tries that are already in the folder are not repeated.  Raises OmplMissing before the first block.
+    """
     require_ompl()
     sizes, starts = QUICK if arguments.quick else Sizes(), 1 if arguments.quick else arguments.starts
     with Progress() as progress:
@@ -125,12 +133,15 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 def judged_claims(folder: Path) -> dict[str, Any]:
-    """Compute the claims from the finished blocks."""
+    """Return the judged claims under "claims", computed from the finished blocks in the folder of a run."""
     return {"claims": judged(CLAIMS, Runs(_blocks(folder), _touchable(), _left()))}
 
 
 def results(folder: Path) -> dict[str, Any]:
-    """Compute the claims and the tables from the finished blocks; to explain the misses, their reaches are simulated from all states."""
+    """Return the claims and the tables, computed from the finished blocks in the folder of a run.
+
+    To explain each missed try of the learner, reaches from all states are simulated offline.
+    """
     blocks, known, left = _blocks(folder), _touchable(), _left()
     return {
         **judged_claims(folder),
@@ -200,9 +211,9 @@ def _left() -> frozenset[int]:
 
 
 def perform(folder: Path, job: Job, seed: int, rate: float = RATE, backend: str = PHYSICS[0]) -> bool:
-    """Launch a system with one job, which records every tick in the folder; returns whether the run is repeatable.
+    """Launch a live system that performs one job, and records every tick in the folder; returns whether the run is repeatable.
 
-    `seed`: of the simulated robot.  Raises LaunchFailed.
+    `seed`: of the simulated robot.  `rate`: ticks per second.  `backend`: physics engine.  Raises LaunchFailed.
     """
     write_job(folder, job)
     world, seconds = WITH_OBSTACLE if job.kind == "moving" else TABLE, MAX_TRY * max(1, len(job.problems) + job.tries)
@@ -212,13 +223,16 @@ def perform(folder: Path, job: Job, seed: int, rate: float = RATE, backend: str 
 
 
 def tries_of(blocks: Sequence[Block], contestant: str, kind: str, numbers: frozenset[int] | None = None) -> list[Judged]:
-    """Return all tries of a contestant on one kind of targets, or only those with the given numbers."""
+    """Return all tries of a contestant on one kind of target, or with `numbers` only the tries of targets with these numbers.
+
+    `contestant`: kind of the block, as "learner" or "peer".  `kind`: "grid", "fresh", "target moves" or "obstacle moves".
+    """
     found = [tried for block in blocks if block.kind == contestant for tried in block.tries if tried.kind == kind]
     return [tried for tried in found if numbers is None or tried.number in numbers]
 
 
 def share(tries: Sequence[Judged]) -> str:
-    """Format the number of successes, and the 95 % interval of their share (Wilson)."""
+    """Return the number of successes and the 95 % interval of their share (Wilson) as text; "none" without tries."""
     made = sum(tried.success for tried in tries)
     if not tries:
         return "none"
@@ -227,7 +241,10 @@ def share(tries: Sequence[Judged]) -> str:
 
 
 def enough(tries: Sequence[Judged], least: float) -> bool | None:
-    """Return whether the share of successes is at least `least`, by its interval."""
+    """Return whether the interval of the share of successes is above `least` (True), below (False), or contains it (None).
+
+    None also for fewer than 20 tries.
+    """
     if len(tries) < MIN_TRIES:
         return None
     return decides(share_interval(sum(tried.success for tried in tries), len(tries)), least=least)
@@ -235,18 +252,22 @@ def enough(tries: Sequence[Judged], least: float) -> bool | None:
 
 @dataclass(frozen=True)
 class Runs:
-    """All blocks; the targets among the 27 that can be reached; and those among them that MoBeE's fields let the palm touch."""
+    """The finished blocks of tries, and which of the thesis' 27 targets can be reached, by number.
+
+    `touchable`: targets for which inverse kinematics finds a pose.  `left`: those of them that a reach of the offline plant can touch; from
+    the others the repulsive fields of the robot keep the palm away.
+    """
 
     blocks: Sequence[Block]
     touchable: frozenset[int]
     left: frozenset[int]
 
     def tries(self, contestant: str, kind: str) -> list[Judged]:
-        """Return the tries of a contestant on targets that can be reached."""
+        """Return the tries of a contestant on one kind of target, "grid" or "fresh"; of "grid" only targets that can be reached."""
         return tries_of(self.blocks, contestant, kind, self.touchable if kind == GRID else None)
 
     def learning(self) -> list[Block]:
-        """Return the blocks in which the learner reached for targets at rest."""
+        """Return the blocks in which the learner reached live for targets at rest, with or without learning."""
         return [block for block in self.blocks if block.kind in ("refine", "learner")]
 
 
@@ -296,7 +317,7 @@ def quick(runs: Runs) -> Measured:
 
 @claim(OUR_AIM, f"{_LIVE} is no worse than inverse kinematics and RRT-Connect (at most {100 * WORSE:.0f} points of success below)", "-")
 def no_worse(runs: Runs) -> Measured:
-    """Compare the successes in the tries, which are the same for both."""
+    """Compare the success of learner and planner in the same tries; undecided for fewer than 20 tries."""
     rivals = {name: runs.tries(name, GRID) + runs.tries(name, FRESH) for name in CONTESTANTS}
     learner, peer = (np.array([tried.success for tried in made]) for made in rivals.values())
     text = "; ".join(f"{NAMES[contestant]} {share(made)}" for contestant, made in rivals.items())
@@ -324,7 +345,10 @@ CLAIMS = (reaches_grid, reaches_new, harmless, quick, no_worse, as_offline)
 
 
 def table(blocks: Sequence[Block], touchable: frozenset[int]) -> list[dict[str, Any]]:
-    """Return the table of results: one row for each agent and set of targets, with the success rate and the costs of its tries."""
+    """Return the table of results: a row for each contestant and set of targets, with the successes and the costs of its tries.
+
+    `touchable`: numbers of the targets among the 27 that can be reached.
+    """
     sets = {
         f"{len(touchable)} of the 27 that can be reached": (GRID, touchable),
         f"the {27 - len(touchable)} others": (GRID, frozenset(range(27)) - touchable),
@@ -354,7 +378,10 @@ def _spent(tries: Sequence[Judged]) -> dict[str, Any]:
 
 
 def misses(blocks: Sequence[Block], touchable: frozenset[int], why: Callable[[tuple[float, float, float]], str]) -> list[dict[str, Any]]:
-    """Return the missed tries of targets that can be reached; `why` explains those of the learner."""
+    """Return a row for each missed try of learner and planner, for targets that can be reached.
+
+    `touchable`: numbers of these targets among the 27.  `why`: function that explains a miss of the learner from the target's position [m].
+    """
     return [
         {
             "contestant": NAMES[block.kind],
@@ -371,7 +398,10 @@ def misses(blocks: Sequence[Block], touchable: frozenset[int], why: Callable[[tu
 
 
 def plot(blocks: Sequence[Block], touchable: frozenset[int]) -> Any:
-    """Draw distances of the palm from the target's surface in two panels, and robot times in one."""
+    """Draw the distances of the palm from the target's surface for both sets of targets, and the robot times of successful tries.
+
+    `touchable`: numbers of the targets among the 27 that can be reached.  Returns a matplotlib figure.
+    """
     drawing = new_figure(14.0, 4.2)
     *distances, times = drawing.subplots(1, 3)
     for axes, kind in zip(distances, (GRID, FRESH), strict=True):
@@ -400,7 +430,7 @@ def plot(blocks: Sequence[Block], touchable: frozenset[int]) -> Any:
 
 
 def figure(folder: Path) -> Path:
-    """Draw the finished blocks."""
+    """Draw the results of the finished blocks in the folder of a run, and return the path of the picture."""
     return saved(plot(_blocks(folder), _touchable()), folder)
 
 

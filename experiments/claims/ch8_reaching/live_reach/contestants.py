@@ -48,7 +48,10 @@ from services.common.service import Service
 
 
 def perform(service: Service, folder: Path) -> None:
-    """Do the job that is in the folder, and append the record of each try to it."""
+    """Do the job that is written in the folder, and append a record of each try to the folder.
+
+    The launched performer calls this function with its own service.
+    """
     job, robot = read_job(folder, Job), load_robot(service.config.robot)
     with ExitStack() as stack:
         mover = None
@@ -103,11 +106,11 @@ def _tried(hand: Hand, problem: Problem, attempt: Callable[[Problem], Ended]) ->
 
 @dataclass(frozen=True, slots=True)
 class Ended:
-    """The result of an attempt.
+    """The result of one attempt to reach a target.
 
-    `ends`: ticks at which a reach ended, or the planner had finished.  `actions`: their number, with reaches.  `believed`: remaining error
-    at the end by the encoders, m.  `thinking`: processor time for plans, s.  `first`: ticks from the request of the last reach to the first
-    command that moves; -1: not timed.
+    `ends`: ticks at which a reach ended, or the planner had finished.  `actions`: number of actions, reaches included.  `believed`:
+    distance from the target's surface at the end by the encoders, m.  `thinking`: processor time for plans, s.  `first`: ticks from the
+    request of the last reach to the first command that moves the arm; -1: not timed.
     """
 
     ends: list[int]
@@ -116,11 +119,14 @@ class Ended:
     thinking: float = 0.0
     first: int = -1
     there: list[float] | None = None
-    """Position of a moving target at the last of the ends, m."""
+    """Position of a moving target at the last of the ends, (3,) m, root frame; None for a target at rest."""
 
 
 def contestant(hand: Hand, job: Job, mover: Mover | None) -> Callable[[Problem], Ended]:
-    """Return the contestant of a job as a function of a problem, with everything loaded that it needs."""
+    """Return a function that lets the contestant of a job attempt a problem; what it needs is loaded before.
+
+    `mover`: moves the target or the obstacle during an attempt; None: nothing moves.
+    """
     if job.kind == "peer":
         return partial(planned, hand, job.seed)
     if job.kind in ("learner", "moving"):
@@ -134,7 +140,11 @@ def contestant(hand: Hand, job: Job, mover: Mover | None) -> Callable[[Problem],
 
 
 def learned(hand: Hand, agent: ReachAgent, seed: int, mover: Mover | None, problem: Problem) -> Ended:
-    """Go to the state with the highest expected reward, and reach; after a miss, repeat from another state."""
+    """Let the learner attempt a problem: go to the state with the highest expected reward, and reach; returns the result.
+
+    After a miss it reaches from another state, up to three times in all.  The learner learns nothing.  `seed`: draws among equally good
+    actions.  `mover`: moves the target or the obstacle; None: nothing moves.
+    """
     where = _present(hand, mover, problem)
     course = Course(hand, agent, agent.predictor.mean, where, np.random.default_rng([seed, problem.number]), MIN_STATE_DISTANCE)
     ends: list[int] = []
@@ -152,7 +162,7 @@ def learned(hand: Hand, agent: ReachAgent, seed: int, mover: Mover | None, probl
 
 
 def learned_offline(job: Job) -> Block:
-    """Make the tries of `learned` on the offline plant, with the learner that was refined live."""
+    """Make the tries of `learned` on the offline plant, with the learner that was refined live; returns the block of tries."""
     plant, tries = offline_plant(job.seed), list[Judged]()
     agent = load_reaches(job.store, plant, PART)
     for problem in job.problems:
@@ -203,7 +213,7 @@ def _present(hand: Hand, mover: Mover | None, problem: Problem) -> Callable[[], 
 
 
 def planned(hand: Hand, seed: int, problem: Problem) -> Ended:
-    """Plan by inverse kinematics and RRT-Connect, and replan after every unexpected outcome."""
+    """Let the planner attempt a problem: inverse kinematics and RRT-Connect, replanned after every unexpected outcome."""
     plant = PeerPlant(hand, 1.0 / RATE)
     peer = PlannerPeer(plant, belief(), PART, "none", seed + problem.number)
     made = peer.try_problem(problem.target)
@@ -211,17 +221,17 @@ def planned(hand: Hand, seed: int, problem: Problem) -> Ended:
 
 
 def at_once(hand: Hand, problem: Problem) -> Ended:
-    """Reach from the present posture."""
+    """Attempt a problem by one reach from the present posture, without a plan; returns the result."""
     hand.present(problem.target)
     missing = hand.reach(PART, MARKER).missing
     return Ended([hand.end], 1, missing, first=hand.first)
 
 
 class PeerPlant(WrappedPlant[Hand]):
-    """The live arm as a plant of the planner peer; the target exerts no force during motions, because the planner avoids it."""
+    """The live arm as the plant of the planner; the target exerts no force during motions, because the planner avoids it."""
 
     def __init__(self, hand: Hand, tick: float) -> None:
-        """`tick`: s."""
+        """Wrap the live arm; `tick`: duration of a tick, s."""
         super().__init__(hand)
         self.ends = list[int]()
         """Ticks at which the peer had finished."""
@@ -230,21 +240,27 @@ class PeerPlant(WrappedPlant[Hand]):
 
     @property
     def time(self) -> float:
-        """Robot time, s."""
+        """The robot time, s."""
         return self.inner.tick * self._dt
 
     def go(self, part: str, target: Array, marker: str) -> Outcome:
-        """See JudgedPlant."""
+        """Remove the target from the world, and perform an action of the part to `target` (n_part,) rad.
+
+        As in `experiments.kit.reaching.arm.JudgedPlant.go`; `marker` is not used.
+        """
         self.inner.present(None)
         return self.act(part, target)
 
     def present(self, target: ReachTarget | None) -> None:
-        """See ReachPlant."""
+        """Put a target into the world, or remove it (None), and keep it for `missing`; as in `mobee.reach.ReachPlant.present`."""
         self._target = target
         super().present(target)
 
     def missing(self, marker: str) -> float:
-        """Return the present distance of the marker from the target by the encoders, m."""
+        """Return the present distance of the marker from the target by the encoders, m; inf without a target.
+
+        The tick of the call is appended to `ends`.
+        """
         self.ends.append(self.inner.tick)
         whole = self.robot.home.copy()
         whole[self.robot.part(PART).slice] = self.measure(PART)

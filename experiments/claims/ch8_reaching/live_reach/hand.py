@@ -25,7 +25,10 @@ UPRIGHT, SPHERE = [1.0, 0.0, 0.0, 0.0], Geometry(kind="sphere", size=[RADIUS])
 
 
 class Hand(BusPlant):
-    """A BusPlant that records the ticks at which its reaches were requested, began to move, and ended."""
+    """The live arm as a plant, which records the ticks at which its reaches were requested, began to move, and ended.
+
+    The ticks are `asked`, `first` (counted from the request; -1: not timed) and `end`.
+    """
 
     def __init__(self, service: Service, robot: Robot) -> None:
         super().__init__(service, robot, (PART,))
@@ -41,12 +44,18 @@ class Hand(BusPlant):
 
     @property
     def tick(self) -> int:
-        """The current tick: that of the bus or of the part's motion, if newer; in lockstep only messages of this part arrive."""
+        """The current tick: the newer one of the tick of the bus and that of the part's last motion message.
+
+        In lockstep only messages of this part arrive.
+        """
         motion = self._motion.get(PART)
         return self._link.bus.k if motion is None else max(self._link.bus.k, motion.k)
 
     def watch_commands(self) -> None:
-        """Measure the time to the first motion of each following reach; this costs time in every tick."""
+        """Time the first motion of every following reach: afterwards `first` has its number of ticks.
+
+        All commands are then read, which costs time in every tick.
+        """
         self._link.on_each(Commands, self._note_commands)
 
     def _ask(self, part: str, verb: str, request: type[Request], **fields: object) -> int:
@@ -67,10 +76,13 @@ class Hand(BusPlant):
 
 
 class Mover:
-    """Moves one object back and forth, in the model's world and, for an obstacle, in the simulator's; a participant of every tick."""
+    """Moves one object back and forth at 3 cm/s, as a participant of the lockstep.
+
+    It moves the object in the world of the model and, if it is the obstacle, in the simulator.
+    """
 
     def __init__(self, service: Service, tick: float) -> None:
-        """`tick`: s."""
+        """Take part in the lockstep by `service`; `tick`: duration of a tick, s."""
         self._service, self._dt = service, tick
         self._step = Participant(service)
         self._name = ""
@@ -79,7 +91,10 @@ class Mover:
         service.on_clock(self._tick)
 
     def start(self, name: str, ends: list[list[float]]) -> None:
-        """Move an object between two positions from now on, beginning at the first."""
+        """Move an object back and forth between two positions from now on, starting at the first.
+
+        `name`: "moving_target", which is added to the world, or "obstacle".  `ends`: two positions [x, y, z], m, root frame.
+        """
         self._ends, self._begin = np.array(ends), self._k
         if name == MOVING_TARGET:
             self._service.call(
@@ -89,7 +104,7 @@ class Mover:
         self._put(self.at(self._k))
 
     def stop(self) -> None:
-        """Remove the target, or move the obstacle away."""
+        """Stop the motion: remove the target from the world, or put the obstacle far away."""
         name, self._name = self._name, ""
         if name == MOVING_TARGET:
             self._service.call(keys.world_rpc("remove"), OneName, Done, name=name)
@@ -97,18 +112,18 @@ class Mover:
             self._place(name, AWAY)
 
     def at(self, k: int) -> Array:
-        """Return the position of the object at a tick, (3,) m."""
+        """Return the position of the moving object at tick `k`, (3,) m, root frame."""
         path = self._ends[1] - self._ends[0]
         gone = SPEED * self._dt * ((k - self._begin) // MOVE_PERIOD * MOVE_PERIOD) / max(float(np.linalg.norm(path)), 1e-9)
         found: Array = self._ends[0] + (1.0 - abs(1.0 - gone % 2.0)) * path
         return found
 
     def now(self) -> Array:
-        """Return the present position of the object."""
+        """Return the position of the moving object at the present tick, (3,) m, root frame."""
         return self.at(self._k)
 
     def leave(self) -> None:
-        """Leave the lockstep."""
+        """End the motion, and leave the lockstep: later ticks do not wait for this service."""
         self._name = ""
         self._step.done(self._k, last=True)
 

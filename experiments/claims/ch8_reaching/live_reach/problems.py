@@ -54,58 +54,66 @@ PATHS = 8  # of an obstacle, that are drawn
 
 @cache
 def robot() -> Robot:
-    """Return the robot of the live system."""
+    """Return the robot of the live system, `icub`."""
     return load_robot(ROBOT)
 
 
 def world(path: Path = TABLE) -> World:
-    """Return the world with the table."""
+    """Return the world in the file `path`, by default the table."""
     return load_world(str(path))
 
 
 @cache
 def space() -> Lattice:
-    """Return the lattice of 81 states of shoulder and elbow."""
+    """Return the lattice of 81 states of the right arm's four joints of shoulder and elbow, with 16 neighbours each."""
     return Lattice(robot(), robot().parts[PART].motors[:JOINTS], LEVELS, NEIGHBOURS)
 
 
 def offline_plant(seed: int) -> OfflinePlant:
-    """Return a plant of the arm with its wrist, at the table, with the motors that were identified on PyBullet."""
+    """Return an offline plant of the right arm with its wrist (seven motors) at the table.
+
+    The motor parameters are those that were identified on PyBullet's robot.
+    """
     motors = MotorParameters.identified(ROBOT)
     return OfflinePlant(Model(robot(), world()), seed, Gains.named(GAINS), motors, 1.0 / RATE, active=robot().parts[PART].motors[:WRIST])
 
 
 def belief() -> PeerBelief:
-    """Return a planner's model: everything that MoBeE's model contains."""
+    """Return the planner's model: the same robot, table, cable constraints and gains as in MoBeE's model."""
     clauses = [clause for clause in robot().clauses if clause.part == PART]
     return PeerBelief(Model(robot(), world()), robot().parts[PART].motors[:WRIST], MARKER, clauses, Gains.named(GAINS))
 
 
 class Problem(Struct, frozen=True):
-    """A target and the first posture of the part."""
+    """A target that is to be reached, and the posture of the arm in which the try begins.
+
+    `kind`: "grid" (a target of the thesis), "fresh" (a new one), "target moves" or "obstacle moves".  `number`: of the problem among those
+    of its kind.  `position`: of the target's centre, m, root frame.  `start`: first posture of the part, (n_part,) rad.
+    """
 
     kind: str
     number: int
     position: list[float]  # m, root frame
     start: list[float]  # rad
     path: list[list[float]] | None = None
-    """Positions, m, between which the target or an obstacle moves back and forth; None: nothing moves."""
+    """The two positions, m, root frame, between which the target or an obstacle moves back and forth; None: nothing moves."""
 
     @property
     def target(self) -> ReachTarget:
-        """The sphere that is presented."""
+        """The target as it is presented: a sphere whose surface the palm has to reach."""
         return ReachTarget(np.array(self.position), aim=AIM)
 
 
 def grid_targets() -> list[ReachTarget]:
-    """Return the 27 targets of the thesis."""
+    """Return the 27 targets of the thesis: spheres of 10 cm on a grid in the workspace."""
     return [ReachTarget(place, aim=AIM) for place in grid()]
 
 
 def touchable(known: PeerBelief, target: ReachTarget) -> bool:
     """Return whether inverse kinematics finds a valid pose with the palm within 2 cm of the target's surface.
 
-    The pose is within limits and cables, and its only contact of solids is that of hand and target.
+    A pose is valid if it is within limits and cable constraints, and its only contact of solids is that of hand and target.  `known`: model
+    of robot and world, into which the target is put.
     """
     known.present(target)
     low, high = known.range.T
@@ -116,13 +124,16 @@ def touchable(known: PeerBelief, target: ReachTarget) -> bool:
 
 
 def grid_problems(seed: int) -> list[Problem]:
-    """Return problems of the 27 targets, reachable or not, each with its own first pose."""
+    """Return a problem for each of the thesis' 27 targets, with a random first pose each; some cannot be reached."""
     rng, known = np.random.default_rng([seed, 271]), belief()
     return [_begun(known, GRID, number, target, rng) for number, target in enumerate(grid_targets())]
 
 
 def fresh_problems(seed: int, count: int) -> list[Problem]:
-    """Return problems of touchable targets drawn in the box around the 27."""
+    """Return `count` problems with new targets, drawn in the box around the 27 targets, that can be reached.
+
+    Raises InvalidValue if 1000 draws are not enough.
+    """
     rng, known, places = np.random.default_rng([seed, 50]), belief(), grid()
     found: list[Problem] = []
     for _ in range(DRAWS):
@@ -135,7 +146,10 @@ def fresh_problems(seed: int, count: int) -> list[Problem]:
 
 
 def moving_problems(seed: int, count: int) -> list[Problem]:
-    """Return problems of new targets that move, and as many with an obstacle that crosses the path of the hand."""
+    """Return `count` problems with a new target that moves, and `count` with an obstacle that crosses the path of the hand.
+
+    There are fewer if too few of the drawn targets allow such a motion.
+    """
     rng, known, found = np.random.default_rng([seed, 51]), belief(), list[Problem]()
     for problem in fresh_problems(seed + 1000, SPARE * count):
         if len(found) < count:
@@ -191,13 +205,16 @@ def _begun(known: PeerBelief, kind: str, number: int, target: ReachTarget, rng: 
 
 
 def posture(known: PeerBelief, q: Array) -> Array:
-    """Return the angles of the whole part, rad, from those of the planned motors (d,); the other motors are at home."""
+    """Return the posture of the whole part (n_part,) rad from the angles `q` of the planned motors (d,) rad; the others are at home."""
     found: Array = known.whole(q)[robot().parts[PART].slice]
     return found
 
 
 def train(file: Path, seed: int, transitions: int, tries: int) -> None:
-    """Learn the transitions, and then the 27 targets, on the offline plant; continues where an earlier call was interrupted."""
+    """Learn transitions, and then to reach for the 27 targets, on the offline plant; everything is recorded in `file`.
+
+    `transitions`, `tries`: numbers to be reached in all, so that an interrupted call can be repeated.
+    """
     plant = offline_plant(seed)
     with TransitionStore(file, PART) as store:
         agent = CuriousAgent(space(), plant, seed=seed, store=store)
@@ -207,7 +224,7 @@ def train(file: Path, seed: int, transitions: int, tries: int) -> None:
 
 
 def learner(plant: ReachPlant, seed: int, file: Path) -> ReachAgent:
-    """Return the learner that continues a record, or begins one."""
+    """Return the reach learner that continues the record in `file`, or begins it; `file` has the learned transitions."""
     known = load_learned(file, PART, plant.robot)
     store = ReachStore(file, PART)
     return LEARNERS[LEARNER].agent(known.space, plant, known.model.debiased(), marker=MARKER, seed=seed, store=store)

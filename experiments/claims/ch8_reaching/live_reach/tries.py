@@ -44,19 +44,29 @@ Kind = Literal["refine", "learner", "peer", "offline", "moving", "first motion"]
 
 
 class Job(Struct, frozen=True):
-    """A block of tries on one launch of the system."""
+    """A block of tries in one launch of the live system.
+
+    `kind`: which contestant makes the tries.  `seed`: of the contestant.  `problems`: what is tried.
+    """
 
     kind: Kind
     seed: int
     store: str
-    """File of the learned transitions and reaches."""
+    """The path of the file with the learned transitions and reaches."""
     problems: list[Problem] = []
     tries: int = 0
-    """Total number of tries after the learner was refined."""
+    """The number of tries that the learner has made, offline and live, when a block of the kind "refine" ends."""
 
 
 class Tried(Struct, frozen=True):
-    """The record of a try; ticks are robot_sim's."""
+    """The record of one try by the contestant; all times are ticks of robot_sim.
+
+    `kind`, `number`: of the problem.  `out`: start towards the first posture.  `begin`: presentation of the target.  `ends`: ends of the
+    reaches, or the tick at which the planner had finished.  `over`: the arm is at rest again.  `off`: error of the first posture, rad.
+    `actions`: number, reaches included.  `believed`: distance from the target's surface at the end by the encoders, m.  `thinking`:
+    processor time for plans, s.  `why`: reason if the try was interrupted.  `asked`: last request.  `there`: position of a moving target at
+    the last end, m.  `first`: ticks from the last request to the first command that moves; -1: not timed.
+    """
 
     kind: str
     number: int
@@ -75,7 +85,14 @@ class Tried(Struct, frozen=True):
 
 
 class Judged(Struct, frozen=True):
-    """The measures of a try, computed from the simulator's joints."""
+    """The measures of one try, computed from the simulator's joint positions.
+
+    `kind`, `number`: of the problem.  `position`: of the target, m.  `off`: distance of the palm from the target's surface at the last end,
+    m.  `success`: within 2 cm.  `seconds`: robot time from the presentation of the target to the last end.  `actions`: number, with the
+    `reaches`.  `thinking`: processor time for plans, s.  `deep`: contacts of solids deeper than 2 mm.  `begun_off`: error of the first
+    posture, rad.  `why`: reason if the try was interrupted.  `first`, `first_motion`: ticks from the request to the first command that
+    moves, and to the first motion of a joint; -1: not timed.
+    """
 
     kind: str
     number: int
@@ -94,7 +111,11 @@ class Judged(Struct, frozen=True):
 
 
 class Block(Struct, frozen=True):
-    """All tries of a job."""
+    """All tries of one job with their measures.
+
+    `kind`: of the job.  `rate`: ticks per second.  `seconds`: robot time of the launch.  `repeatable`: whether the run can be repeated
+    exactly.  `deep`: contacts of solids deeper than 2 mm in the whole launch.
+    """
 
     kind: str
     rate: float  # Hz
@@ -105,7 +126,10 @@ class Block(Struct, frozen=True):
 
 
 def measure(folder: Path, job: Job, rate: float, repeatable: bool) -> Block:
-    """Measure the tries of a launch by the records in its folder."""
+    """Return the block of a finished launch: measures of its tries, computed from the records in its folder.
+
+    `rate`: ticks per second.  `repeatable`: whether the launch can be repeated exactly.
+    """
     q = np.fromfile(folder / POSITIONS).reshape(-1, len(robot().motors))
     deep = [touch for touch in read_touches(folder / CONTACTS, 1.0 / rate) if touch.depth > MIN_DEPTH]
     done = read_done(folder, Tried)
@@ -116,7 +140,11 @@ def measure(folder: Path, job: Job, rate: float, repeatable: bool) -> Block:
 
 
 def judge(tried: Tried, position: Array, q: Array, deep: list[Touch], model: Model, rate: float) -> Judged:
-    """Return the measures of a try, such as its success; `q` (T, n) rad: row k - 2 holds the joints at the beginning of tick k."""
+    """Return the measures of one try, such as its success.
+
+    `position`: of the target's centre (3,) m.  `q`: (T, n) rad, joint positions of the simulator; row k - 2 has those at the beginning of
+    tick k.  `deep`: contacts of solids deeper than 2 mm in the launch.  `rate`: ticks per second.
+    """
     off = np.inf
     if tried.ends:
         palm = model.evaluate(q[tried.ends[-1] - 2]).position(MARKER)
@@ -149,21 +177,22 @@ def _first_motion(q: Array, asked: int) -> int:
 
 
 def write_block(folder: Path, block: Block) -> None:
-    """Write a block to its folder, completely or not at all."""
+    """Write a block to the file block.json in the folder, completely or not at all."""
     new = (folder / BLOCK).with_suffix(".new")
     new.write_text(encoded(block, indent=1))
     new.replace(folder / BLOCK)
 
 
 def read_block(folder: Path) -> Block:
-    """Read a block written by `write_block`."""
+    """Read the block that `write_block` has written to the folder."""
     return decoded((folder / BLOCK).read_text(), Block)
 
 
 def nearest_reach(plant: OfflinePlant, target: ReachTarget) -> tuple[float, str]:
-    """Return the smallest remaining error of a reach from any state, m, and the deepest contacts at its end with depths in mm.
+    """Simulate a reach for the target from every state, and return the smallest remaining error [m] and the contacts at its end.
 
-    The search stops at the first reach that succeeds.
+    The contacts are the deepest two, as text with the names of the links and the depth in mm.  The search stops at the first reach that
+    ends within 2 cm of the surface.
     """
     best, ending = np.inf, plant.robot.home
     arm = plant.robot.part(PART).slice
@@ -189,7 +218,7 @@ def _contacts(plant: OfflinePlant, q: Array) -> str:
 
 
 def main() -> None:
-    """Print the table."""
+    """Print a table of the targets that can be reached, with the best offline reach and the contacts at its end."""
     known, plant = belief(), offline_plant(0)
     lines = ["| target | x | y | z | best reach [mm] | contacts there [mm] |", "| --- | --- | --- | --- | --- | --- |"]
     for number, target in enumerate(grid_targets()):

@@ -17,7 +17,10 @@ from services.common.service import Service
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Call the configured function, then ask the launcher to shut the system down."""
+    """Call the function that the settings name, then ask the launcher to shut the system down.
+
+    `argv`: arguments of the command line; None: those of the process.
+    """
     config = load_config(Config, argv, "experiments.kit.live.performer")
     module, _, function = config.perform.partition(":")
     with explained(config.perform):

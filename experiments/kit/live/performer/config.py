@@ -7,9 +7,9 @@ from services.common.config import ServiceConfig
 
 
 class Config(ServiceConfig, frozen=True, kw_only=True):
-    """The performer's settings."""
+    """The settings of the performer, besides those of every service."""
 
     perform: str = ""
-    """The function to call with the service and the folder of the job, as "package.module:function"."""
+    """The function to call, as "package.module:function"; its arguments are the service and the folder of the job."""
     run_dir: str = ""
-    """Folder of the job and of the results."""
+    """Folder of the job, and of the results of the function."""
