@@ -94,6 +94,8 @@ class Child:
     program: Program
     phase: Phase = "waiting"
     process: subprocess.Popen[bytes] | None = None
+    standby: subprocess.Popen[bytes] | None = None  # takes the place of the process when that one fails
+    has_prepared: bool = False  # a standby process was started since the last start
     since: float = 0.0  # monotonic time of the last change of phase
     failures: deque[float] = field(default_factory=deque)  # monotonic times
     restarts: int = 0
@@ -130,14 +132,29 @@ class Child:
         self.phase, self.since = phase, time.monotonic()
 
     def spawn(self, launcher: str) -> None:
-        """Start the process, which waits for `release` before it joins the system.
+        """Start the process, or use the standby process if there is one; the process waits for `release` before it joins the system.
 
         Until then it imports its packages and reads its robot. `launcher`: value of the environment variable HELD, which names the router
-        that the process may join. The process has a process group of its own, so that Ctrl-C in a terminal reaches the launcher only. It
-        stays in the launcher's session, because with autogroup scheduling niceness counts only within a session.
+        that the process may join. Raises OSError if the operating system refuses to start the process.
+        """
+        if self.standby is not None and self.standby.poll() is not None:
+            self.dismiss()
+        self.process, self.standby = self.standby or self._start(launcher), None
+        self.has_token, self.asking, self.asked_at, self.stat, self.has_prepared = False, False, 0.0, None, False
+        self.note_answer(0.0)
+
+    def prepare(self, launcher: str) -> None:
+        """Start a standby process, which does not join the system before `spawn` uses it; arguments and errors as in `spawn`."""
+        self.has_prepared = True
+        self.standby = self._start(launcher)
+
+    def _start(self, launcher: str) -> subprocess.Popen[bytes]:
+        """Start a process in a process group of its own, so that Ctrl-C in a terminal reaches the launcher only.
+
+        It stays in the launcher's session, because with autogroup scheduling niceness counts only within a session.
         """
         with self.program.log.open("ab") as log:
-            self.process = subprocess.Popen(
+            process = subprocess.Popen(
                 self.program.argv,
                 stdin=subprocess.PIPE,
                 stdout=log,
@@ -147,11 +164,10 @@ class Child:
             )
         if self.program.nice:
             own = os.getpriority(os.PRIO_PROCESS, 0)  # only root may start a process of a higher priority than its own
-            os.setpriority(os.PRIO_PROCESS, self.process.pid, max(own, self.program.nice))
+            os.setpriority(os.PRIO_PROCESS, process.pid, max(own, self.program.nice))
             if hasattr(os, "SCHED_BATCH"):  # Linux: when it wakes, it preempts no other process
-                os.sched_setscheduler(self.process.pid, os.SCHED_BATCH, os.sched_param(0))
-        self.has_token, self.asking, self.asked_at, self.stat = False, False, 0.0, None
-        self.note_answer(0.0)
+                os.sched_setscheduler(process.pid, os.SCHED_BATCH, os.sched_param(0))
+        return process
 
     def note_answer(self, when: float) -> None:
         """Record that the service answered at the monotonic time `when` [s]; this ends its silence."""
@@ -202,16 +218,15 @@ class Child:
 
     def kill(self) -> None:
         """Kill the process and all processes of its group, and wait until it has ended."""
-        if self.process is None:
-            return
-        try:
-            os.killpg(self.process.pid, signal.SIGKILL)
-        except ProcessLookupError:
-            pass  # all of them have ended
-        self.process.wait()
-        if self.process.stdin is not None:
-            self.process.stdin.close()
-        self.process = None  # its number may now name another process
+        if self.process is not None:
+            _kill(self.process)
+            self.process = None  # its number may now name another process
+
+    def dismiss(self) -> None:
+        """Kill the standby process, if there is one."""
+        if self.standby is not None:
+            _kill(self.standby)
+            self.standby = None
 
     def last_log_line(self) -> str:
         """Return the last line of the process's log that is not empty, or a text that says why there is none."""
@@ -222,3 +237,13 @@ class Child:
         except OSError as error:
             return f"its log cannot be read: {error.strerror}"
         return next((line.strip() for line in reversed(lines) if line.strip()), "its log is empty")
+
+
+def _kill(process: subprocess.Popen[bytes]) -> None:
+    try:
+        os.killpg(process.pid, signal.SIGKILL)
+    except ProcessLookupError:
+        pass  # all of them have ended
+    process.wait()
+    if process.stdin is not None:
+        process.stdin.close()

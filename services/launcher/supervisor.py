@@ -23,8 +23,10 @@ MAX_UNANSWERED = 2  # stat calls in a row; then a service can count as frozen
 FROZEN_TIME, FROZEN_TIME_NICE = 2.0, 10.0  # s without an answer; the latter for a service that yields to all others
 NICE_SERVICE = 10  # niceness from which the longer time applies
 READY_TIMEOUT = 60.0  # s from its start until a service is ready
-FIRST_WAIT, LONGEST_WAIT = 0.2, 5.0  # s before a restart, doubled with every failure
+FIRST_WAIT, LONGEST_WAIT = 0.2, 5.0  # s before the second restart and later ones, doubled with every failure; the first is immediate
 MAX_RESTARTS, RESTART_WINDOW = 5, 60.0  # restarts within so many s; then a service is given up
+STANDBY_DELAY = 10.0  # s for which a vital service is ready before its standby process starts: many runs end before
+STANDBY_PERIOD = 1.0  # s between two starts of standby processes, each of which needs a processor for 0.5 to 1 s
 END_TIMEOUT = 2.0  # s from SIGTERM to SIGKILL
 
 
@@ -64,6 +66,7 @@ class Supervisor:
         self._service, self._announce, self._stopping = service, announce, False
         self._stops, self._held, self._is_reachable = stops, held or service.instance, is_reachable
         self._elsewhere = elsewhere or {}
+        self._next_standby = 0.0  # monotonic time [s] from which the next standby process may start
         service.on_alive(self._note_token)
 
     def begin(self) -> None:
@@ -93,6 +96,8 @@ class Supervisor:
     def stop(self) -> None:
         """End all services stage by stage, the last stage first. A service that does not end within 2 s is killed."""
         self._stopping = True
+        for child in self.children.values():
+            child.dismiss()
         for stage in sorted({child.program.stage for child in self.children.values()}, reverse=True):
             group = [child for child in self.children.values() if child.program.stage == stage]
             for child in group:
@@ -112,6 +117,7 @@ class Supervisor:
         self._stopping = True
         for child in self.children.values():
             child.kill()
+            child.dismiss()
 
     def _check_all(self) -> None:
         now = time.monotonic()
@@ -125,12 +131,13 @@ class Supervisor:
             services: Mapping[str, Watched] = {**self._elsewhere, **self.children}
             if all(services[who].lets_others_start for who in child.program.after if who in services):
                 child.release()
-        elif child.phase == "failed" and now >= child.again_at and self._is_reachable():
+        elif child.phase in ("starting", "ready"):
+            self._check_process(child, now)
+            self._check_standby(child, now)
+        if child.phase == "failed" and time.monotonic() >= child.again_at and self._is_reachable():
             child.restarts += 1
             if self._spawn(child):
                 child.release()
-        elif child.phase in ("starting", "ready"):
-            self._check_process(child, now)
 
     def _check_process(self, child: Child, now: float) -> None:
         if child.starvation is not None:
@@ -150,6 +157,16 @@ class Supervisor:
             self._ask_pulse(child)
         elif not child.asking and now >= child.asked_at + STAT_PERIOD and (child.has_token or child.phase == "ready"):
             self.ask(child)
+
+    def _check_standby(self, child: Child, now: float) -> None:
+        """Start a standby process of a vital service, so that a restart does not wait for the imports; one at a time."""
+        is_due = child.phase == "ready" and now - child.since >= STANDBY_DELAY and now >= self._next_standby
+        if child.program.vital and is_due and not child.has_prepared:
+            self._next_standby = now + STANDBY_PERIOD
+            try:
+                child.prepare(self._held)
+            except OSError as error:
+                self._service.log.warning("no standby process of %s: %s", child.who, error)
 
     def _is_frozen(self, child: Child, now: float) -> bool:
         """Test calls and time: a call on a dropped connection fails at once, and the launcher itself may have been stopped for a while.
@@ -207,6 +224,7 @@ class Supervisor:
         if code == 0 and child.program.may_end:
             self._announce(f"{child.who} has ended")
             child.kill()
+            child.dismiss()
             child.enter("ended")
         elif code == BAD_INPUT:
             child.kill()
@@ -220,7 +238,7 @@ class Supervisor:
             self._fail(child, f"ended with code {code}: {child.last_log_line()}")
 
     def _fail(self, child: Child, reason: str) -> None:
-        """Kill the process, and start it again after a time that doubles with every failure."""
+        """Kill the process, and start it again: at once after the first failure, later after a time that doubles with every failure."""
         child.kill()
         now = time.monotonic()
         child.failures.append(now)
@@ -230,14 +248,15 @@ class Supervisor:
         if len(child.failures) > MAX_RESTARTS:
             self._give_up(child, f"{reason}; given up after {MAX_RESTARTS} restarts in {RESTART_WINDOW:g} s")
             return
-        wait = min(FIRST_WAIT * 2 ** (len(child.failures) - 1), LONGEST_WAIT)
+        wait = 0.0 if len(child.failures) == 1 else min(FIRST_WAIT * 2 ** (len(child.failures) - 2), LONGEST_WAIT)
         child.again_at = now + wait
         child.enter("failed")
         self._service.bus.event("warning", "restart", f"{child.who} {reason}")
-        self._announce(f"{child.who} {reason}; starts again in {wait:.1f} s")
+        self._announce(f"{child.who} {reason}; starts again {f'in {wait:.1f} s' if wait else 'at once'}")
 
     def _give_up(self, child: Child, reason: str) -> None:
         child.reason = reason
+        child.dismiss()
         child.enter("fault")
         self.report_fault(f"{child.who} {reason}", child.program.vital, f" (its log: {child.program.log})")
 

@@ -14,7 +14,7 @@ import pytest
 
 from services.common.service import Service
 from services.launcher.child import Child, Program
-from services.launcher.supervisor import FROZEN_TIME, FROZEN_TIME_NICE, Supervisor
+from services.launcher.supervisor import FROZEN_TIME, FROZEN_TIME_NICE, STANDBY_DELAY, STANDBY_PERIOD, Supervisor
 
 ROOT = Path(__file__).parents[3]
 
@@ -50,6 +50,47 @@ def test_what_yields_to_others_may_be_silent_for_longer(nice: int, limit: float)
     child = Child(Program("monitor", (), Path("monitor.log"), nice=nice), phase="ready", unanswered=5, answered_at=time.monotonic())
     assert not supervisor._is_frozen(child, child.answered_at + limit - 0.1)
     assert supervisor._is_frozen(child, child.answered_at + limit)
+
+
+def test_a_vital_service_that_is_ready_for_long_has_a_standby_process(tmp_path: Path) -> None:
+    supervisor = Supervisor(cast("Service", Silent()), [], cast("Any", None), lambda text: None)
+    children = [
+        Child(Program(who, ("sleep", "60"), tmp_path / f"{who}.log", vital=vital), phase="ready", since=100.0)
+        for who, vital in (("model", True), ("monitor", False), ("controller", True))
+    ]
+    prepared = []
+    try:
+        for now in (100.0 + STANDBY_DELAY - 0.1, 100.0 + STANDBY_DELAY, 100.0 + STANDBY_DELAY + STANDBY_PERIOD):
+            for child in children:
+                supervisor._check_standby(child, now)
+            prepared.append([child.who for child in children if child.standby is not None])
+        assert prepared == [[], ["model"], ["model", "controller"]]
+    finally:
+        for child in children:
+            child.dismiss()
+
+
+def test_the_standby_process_takes_the_place_of_one_that_failed(tmp_path: Path) -> None:
+    child = Child(Program("model", ("sleep", "60"), tmp_path / "model.log"))
+    try:
+        child.spawn("launcher")
+        child.prepare("launcher")
+        assert child.standby is not None
+        standby = child.standby.pid
+        child.kill()
+        child.spawn("launcher")
+        assert (child.pid, child.standby) == (standby, None)
+        child.prepare("launcher")
+        child.standby.kill()
+        child.standby.wait()
+        dead = child.standby.pid
+        child.kill()
+        child.spawn("launcher")
+        assert child.running()
+        assert child.pid != dead
+    finally:
+        child.kill()
+        child.dismiss()
 
 
 SPAWN = """import os
