@@ -506,7 +506,7 @@ class EStop(Message, frozen=True, kw_only=True):
         "estop",
         "STOP",
         writers=EVERYONE,
-        readers=("robot_sim", "controller", "port_filter", "launcher", "monitor"),
+        readers=("robot_sim", "controller", "port_filter", "agent", "launcher", "monitor"),
         when="at a stop; launcher and controller repeat it until robot_sim has latched it, then robot_sim repeats it",
     )
 

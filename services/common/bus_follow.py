@@ -18,7 +18,7 @@ from mobee.errors import ActionInterrupted, MobeeError
 from mobee.plant import Outcome
 from mobee.robot.motor_units import fine_units
 from mobee.robot.robot import Robot
-from services.common.bus_plant import BusPlant
+from services.common.bus_plant import BusPlant, Sent
 from services.common.rpc import CallFailed
 from services.common.service import Service
 
@@ -89,7 +89,7 @@ class BusFollower(BusPlant):
         """
         begun, run, last = self._now, self._runs, len(attractors) - 1
         self._seen.clear()
-        asked: dict[str, tuple[str, int]] = {}
+        asked: dict[str, Sent] = {}
         row, before = 0, None
         while True:
             here = attractors[row]
@@ -103,9 +103,9 @@ class BusFollower(BusPlant):
             self._until(parts, run, self._reached(begun + (row + 1) * period), CLOCK_TIMEOUT, "the robot's clock stands still")
             row, before = min(max(row + 1, int((self._now - begun) / period)), last), here
         self._until(
-            parts, run, lambda: all(self._is_over(part, *one) for part, one in asked.items()), REST_TIMEOUT, "it does not come to rest"
+            parts, run, lambda: all(self._is_over(part, one) for part, one in asked.items()), REST_TIMEOUT, "it does not come to rest"
         )
-        return {part: self._outcome(part, action_id) for part, (action_id, _) in asked.items()}
+        return {part: self._outcome(part, one) for part, one in asked.items()}
 
     def seen(self) -> tuple[Array, Array]:
         """Return the encoder values (T, n) rad of all ticks since `follow` began, and the times (T,) s of these ticks since the first."""
@@ -128,10 +128,9 @@ class BusFollower(BusPlant):
     def _has(self, parts: Sequence[str]) -> bool:
         return all(self._owns(part) and self._is_free(part) for part in parts)
 
-    def _aim(self, part: str, target: Array) -> tuple[str, int]:
-        """Set a part's attractor (n_part,) rad; return the id of the action, and the tick at which it began."""
-        action_id = uuid.uuid4().hex
-        return action_id, self._ask(part, "goal", Goal, action_id=action_id, q=[float(x) for x in target])
+    def _aim(self, part: str, target: Array) -> Sent:
+        """Set a part's attractor (n_part,) rad."""
+        return self._send(part, "goal", Goal, uuid.uuid4().hex, q=[float(x) for x in target])
 
     def _until(self, parts: Sequence[str], run: int, enough: Callable[[], bool], patience: float, why: str) -> None:
         """Wait until `enough` returns True; raises ActionInterrupted with `why` after `patience` s, or if a part is lost."""

@@ -7,13 +7,14 @@ import time
 import uuid
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from bus_schema import keys
-from bus_schema.messages import Clock, Geometry, Motion, Reach, Tick, Turn
+from bus_schema.messages import Clock, EStop, Geometry, Motion, Reach, Tick, Turn
 from bus_schema.rpc import AddObject, Done, Empty, Goal, ObjectState, OneName, ReachFor, Request, Started, Take, Taken, WithEpoch, World
 from mobee.arrays import Array
 from mobee.errors import ActionInterrupted, InvalidValue, MobeeError, UnknownName
@@ -178,6 +179,23 @@ def _inner_radius(shape: Geometry) -> float:
 
 RETRY_PERIOD = 0.2  # s between attempts while there is no controller or the part is in hold
 OWNED_PATIENCE = 3.0  # s for which a goal may belong to another service: the token of one that ended lasts up to a second
+SEND_AGAIN_WITHIN = 10.0  # s of the bus clock from the end of the controller, as LONGEST_SUSPENSION of services/controller/action.py
+
+
+@dataclass(frozen=True)
+class Sent:
+    """An action that a controller has accepted.
+
+    `controllers`: instances of the controller that were alive when the action was sent. `k`: tick at which the action began. If it was
+    sent again to a later controller, `k` is that of the later controller, `first_k` that of the first, and `touched` are the world objects
+    that the part has touched before.
+    """
+
+    id: str
+    controllers: frozenset[str]
+    k: int
+    first_k: int
+    touched: frozenset[str] = frozenset()
 
 
 class BusPlant:
@@ -199,6 +217,7 @@ class BusPlant:
         self._participant = Participant(service)
         self._wanted: set[str] = set()  # parts that were measured
         self._is_resting = False
+        self._was_stopped = False  # an emergency stop was received since the action was sent
         self._to_answer: int | None = None  # lockstep: the tick that waits for this service
         for part in parts:
             robot.part(part)
@@ -208,6 +227,7 @@ class BusPlant:
         else:
             service.on_clock(self._note_clock)
         service.on_run(self._new_run)
+        service.on_newest(EStop, self._note_stop)
         self._reaches = ReachClient(service, parts)
 
     @property
@@ -239,11 +259,12 @@ class BusPlant:
     def act(self, part: str, target: Array) -> Outcome:
         """Set the part's attractor to `target` (n_part,) rad, and wait until the part has settled or timed out; return the outcome.
 
-        Implements `mobee.plant.Plant.act`. Raises InvalidValue for a target beyond the limits; ActionInterrupted on a hold, a fault or a
-        new run, and if the controller ends or gives the goal to another service.
+        Implements `mobee.plant.Plant.act`. If the controller ends, the action continues as soon as another controller has the part under
+        control. Raises InvalidValue for a target beyond the limits; ActionInterrupted on a hold, a fault or a new run, if no controller
+        can continue within 10 s, and if the controller gives the goal to another service.
         """
-        action_id = self._perform(part, "goal", Goal, q=[float(x) for x in target])
-        return self._outcome(part, action_id)
+        sent = self._perform(part, "goal", Goal, q=[float(x) for x in target])
+        return self._outcome(part, sent)
 
     def present(self, target: ReachTarget | None) -> None:
         """Put a target into the model's world as the object `reach_target`, or move it there; None removes it.
@@ -286,35 +307,70 @@ class BusPlant:
         ActionInterrupted as `act`.
         """
         self.robot.marker(marker)
-        action_id = self._perform(part, "reach", ReachFor, marker=marker, stay=stay, **self._reaches.asked())
-        after = self._outcome(part, action_id)
+        sent = self._perform(part, "reach", ReachFor, marker=marker, stay=stay, **self._reaches.asked())
+        after = self._outcome(part, sent)
         return self._reaches.outcome(part, self._motion[part], after, self._tick)
 
-    def _perform(self, part: str, verb: str, request: type[Request], **fields: object) -> str:
-        """Start an action and wait for its end; return its id.  Raises ActionInterrupted, or InvalidValue if it is refused."""
+    def _perform(self, part: str, verb: str, request: type[Request], **fields: object) -> Sent:
+        """Start an action and wait for its end.  Raises ActionInterrupted, or InvalidValue if it is refused."""
         if part not in self._epochs:
             self.measure(part)
         elif part in self._motion and not self._owns(part):
             del self._epochs[part]
             raise ActionInterrupted(f"{part}: this service lost its goal; measure the part again")
-        run, action_id = self._runs, uuid.uuid4().hex
-        asked = self._ask(part, verb, request, action_id=action_id, **fields)
+        run, self._was_stopped = self._runs, False
+        sent = self._send(part, verb, request, uuid.uuid4().hex, **fields)
 
         def is_known() -> bool:
-            return self._is_over(part, action_id, asked) and (
-                verb == "goal" or self._is_interrupted(part, action_id) or self._reaches.has_ended(part, action_id)
+            return self._is_over(part, sent) and (
+                verb == "goal" or self._is_interrupted(part, sent) or self._reaches.has_ended(part, sent.id)
             )
+
+        def has_changed() -> bool:
+            return run != self._runs or is_known() or self._has_lost_controller(sent)
 
         while True:
             self._service.check_router()
-            self._wait(lambda: run != self._runs or is_known())
+            self._wait(has_changed)
             if run != self._runs:
                 raise ActionInterrupted(f"{part}: robot_sim started a new run")
             if is_known():
-                return action_id
-            if not self._owns(part) or not self._service.alive.get("controller"):
+                return sent
+            if self._has_lost_controller(sent) and verb == "goal":
+                sent = self._send_again(part, run, sent, **fields)
+            elif self._has_lost_controller(sent) or not self._owns(part):
                 self._epochs.pop(part, None)
                 raise ActionInterrupted(f"{part}: the controller has ended, or gave its goal to another service")
+
+    def _send_again(self, part: str, run: int, sent: Sent, **fields: object) -> Sent:
+        """Continue an action whose controller has ended: send its goal to the next controller, once that has the part under control.
+
+        As after a short hold, the part rests on the path to its goal.  Raises ActionInterrupted after SEND_AGAIN_WITHIN, an emergency
+        stop, a new run or a request to rest: then the part must not move to an old goal.
+        """
+        self._epochs.pop(part, None)
+        motion = self._motion.get(part)
+        touched = frozenset(motion.touched) if motion is not None and motion.action_id == sent.id else frozenset()
+        give_up = self._service.bus.t + round(SEND_AGAIN_WITHIN * 1e9)
+
+        def is_ready() -> bool:
+            return self._owns(part) and self._is_free(part)
+
+        while True:
+            self._service.check_router()
+            self._take(part)
+            self._wait(lambda: run != self._runs or is_ready())
+            if self._was_stopped or self._is_resting or run != self._runs or self._service.bus.t > give_up:
+                raise ActionInterrupted(f"{part}: the controller has ended, and the action cannot continue")
+            if is_ready():
+                try:
+                    again = self._send(part, "goal", Goal, sent.id, **fields)
+                except ActionInterrupted as refusal:
+                    self._service.log.info("the goal is sent once more: %s", refusal)
+                    self._wait(lambda: False)
+                else:
+                    self._service.bus.event("info", "sent_again", f"{part} continues its action with the new controller")
+                    return replace(again, first_k=sent.first_k, touched=sent.touched | touched)
 
     def release(self, part: str) -> None:
         """Release the goal of the part, if this service owns it; raises services.common.rpc.CallFailed."""
@@ -388,34 +444,43 @@ class BusPlant:
         self._tick = turn.dt * 1e-9
         self._to_answer = turn.k
 
-    def _ask(self, part: str, verb: str, request: type[Request], **fields: Any) -> int:
-        """Start an action; return the tick at which it began."""
+    def _send(self, part: str, verb: str, request: type[Request], action_id: str, **fields: Any) -> Sent:
+        """Start an action."""
+        key, controllers = keys.goal(part, verb), self._controllers()
         try:
-            reply = self._service.call(keys.goal(part, verb), request, Started, tries=TRIES, epoch=self._epochs[part], **fields)
+            reply = self._service.call(key, request, Started, tries=TRIES, epoch=self._epochs[part], action_id=action_id, **fields)
         except CallFailed as error:
             if error.code in ("limits", "reach"):
                 raise InvalidValue(str(error)) from None
             if error.code == "epoch":
                 del self._epochs[part]
             raise ActionInterrupted(f"{part}: {error}") from None
-        return reply.k
+        return Sent(action_id, controllers, reply.k, reply.k)
 
-    def _outcome(self, part: str, action_id: str) -> Outcome:
+    def _controllers(self) -> frozenset[str]:
+        return frozenset(self._service.alive.get("controller", ()))
+
+    def _has_lost_controller(self, sent: Sent) -> bool:
+        return self._controllers().isdisjoint(sent.controllers)
+
+    def _outcome(self, part: str, sent: Sent) -> Outcome:
         motion = self._motion[part]
-        if self._is_interrupted(part, action_id):
+        if self._is_interrupted(part, sent):
             raise ActionInterrupted(f"{part}: the part was in hold before the action ended")
-        duration = (motion.since_k - motion.start_k) * self._tick
-        return Outcome(np.array(motion.q), motion.status == "settled", duration, tuple(motion.touched))
+        duration = (motion.since_k - sent.first_k) * self._tick
+        return Outcome(np.array(motion.q), motion.status == "settled", duration, tuple(sorted({*sent.touched, *motion.touched})))
 
-    def _is_over(self, part: str, action_id: str, asked: int) -> bool:
+    def _is_over(self, part: str, sent: Sent) -> bool:
         motion = self._motion.get(part)
-        if motion is None or motion.k <= asked:
+        if motion is None or motion.k <= sent.k:
             return False
-        return motion.action_id != action_id or motion.status not in ("moving", "suspended")
+        if motion.action_id != sent.id:  # a new controller does not know it
+            return not self._has_lost_controller(sent)
+        return motion.status not in ("moving", "suspended")
 
-    def _is_interrupted(self, part: str, action_id: str) -> bool:
+    def _is_interrupted(self, part: str, sent: Sent) -> bool:
         motion = self._motion[part]
-        return motion.action_id != action_id or motion.status == "held"
+        return motion.action_id != sent.id or motion.status == "held"
 
     def _is_free(self, part: str) -> bool:
         motion = self._motion.get(part)
@@ -454,6 +519,9 @@ class BusPlant:
             self._motion[part] = motion
 
         return note
+
+    def _note_stop(self, stop: EStop) -> None:
+        self._was_stopped = self._was_stopped or stop.set
 
     def _note_q(self, tick: Tick) -> None:
         self._q = np.array(tick.q)

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from bus_schema import encoding_of, keys
-from bus_schema.messages import Clock, Decision, Event, Motion, Transition
+from bus_schema.messages import Clock, Decision, EStop, Event, Motion, Transition
 from bus_schema.rpc import Done, Empty, Explore, Goal
 from mobee import Lattice, load_robot
 from mobee.errors import UnknownName
@@ -136,21 +136,51 @@ def test_a_hold_interrupts_the_action_nothing_is_stored_and_it_continues_later(s
     assert agent.is_running
 
 
-def test_a_new_controller_is_asked_again(stage: Stage) -> None:
+def under_way(stage: Stage) -> int:
+    """Start an agent, let an action that does not end touch the table, and return the number of transitions before it."""
     stage.agent()
     stage.made(2)
-    stage.controller.lasts = 1_000_000
+    stage.controller.lasts, stage.controller.touched = 1_000_000, ["table"]
     wait_for(lambda: stage.controller.status == "moving", "an action")
-    old = stage.controller.epoch
-    before = len(stage.rows())
-    stage.controller.lasts = 5
+    ticks = stage.rig.bus.k
+    wait_for(lambda: stage.rig.bus.k > ticks + 20, "some ticks of it")
+    return len(stage.rows())
+
+
+def test_an_action_continues_with_a_new_controller(stage: Stage) -> None:
+    before, old = under_way(stage), stage.controller.epoch
     stage.controller.restart()
-    stage.made(before + 3)
+    stage.controller.lasts, stage.controller.touched = 5, []
+    continued = stage.made(before + 3)[before]
     assert stage.controller.takes == 2
     assert stage.controller.epoch > old
-    numbers = [row["n"] for row in stage.rows()]
-    assert numbers == list(range(1, len(numbers) + 1))
-    wait_for(lambda: stage.texts("interrupted"), "the event")
+    first, again = stage.controller.goals[before : before + 2]
+    assert (first.action_id, first.q) == (again.action_id, again.q)
+    assert continued.touched == ["table"]
+    assert continued.duration > 20 * 0.01
+    assert [row["n"] for row in stage.rows()][: before + 3] == list(range(1, before + 4))
+    assert stage.texts("interrupted") == []
+    assert stage.texts("sent_again") == ["torso continues its action with the new controller"]
+
+
+@pytest.mark.parametrize("cause", ["emergency stop", "long hold"])
+def test_an_action_does_not_continue_with_a_new_controller_after(stage: Stage, cause: str) -> None:
+    before = under_way(stage)
+    if cause == "emergency stop":
+        stage.rig.bus.publisher(EStop).put(set=True, source="test", reason="a test")
+        time.sleep(0.5)
+    stage.controller.restart()
+    stage.controller.lasts = 5
+    if cause == "long hold":
+        stage.controller.hold()
+        begin = stage.rig.bus.t
+        wait_for(lambda: stage.rig.bus.t > begin + 10e9, "10 s of the bus clock")
+        stage.controller.resume()
+    stage.made(before + 2)
+    assert "cannot continue" in wait_for(lambda: stage.texts("interrupted"), "the event")[0]
+    assert stage.texts("sent_again") == []
+    first, following = stage.controller.goals[before : before + 2]
+    assert first.action_id != following.action_id
 
 
 def test_a_new_run_ends_the_action_without_an_observation(stage: Stage) -> None:

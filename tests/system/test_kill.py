@@ -89,6 +89,12 @@ def test_the_whole_robot_holds(live: tuple[Launch, Watcher], who: str, limit: fl
     assert max(rested) <= limit + 0.2  # 60 deg/s at 600 deg/s^2 is 0.1 s, and the motors' delay and lag
     wait_back(watcher, who, pid)
     all_continue(live, before)
+    if who == "controller":
+        for part in AGENTS:
+            motions = watcher.motions[part]
+            new = next(i for i, motion in enumerate(motions) if motion.k > k and not motion.action_id)  # it knows no action yet
+            last, following = motions[new - 1], next(motion.action_id for motion in motions[new:] if motion.action_id)
+            assert last.status != "moving" or following == last.action_id, f"the action of {part} was lost"
 
 
 def test_an_agent_alone_stops_its_part(live: tuple[Launch, Watcher]) -> None:

@@ -20,7 +20,7 @@ from mobee import ActionInterrupted, AdaptiveRoadmap, MobeeError, Model, Space, 
 from mobee.arrays import Array
 from mobee.plant import Outcome
 from mobee.robot.robot import Robot
-from services.common.bus_plant import BusPlant
+from services.common.bus_plant import BusPlant, Sent
 from services.common.lockstep import Participant
 from services.common.rpc import CallFailed
 from services.common.service import Service
@@ -245,15 +245,16 @@ class ContactStopPlant(BusPlant):
             self._watcher.done(max(self._watched, 0), last=True)
             self._watcher = None
 
-    def _ask(self, part: str, verb: str, request: type[Request], **fields: object) -> int:
-        self.asked, self.commanded = super()._ask(part, verb, request, **fields), -1
-        return self.asked
+    def _send(self, part: str, verb: str, request: type[Request], action_id: str, **fields: object) -> Sent:
+        sent = super()._send(part, verb, request, action_id, **fields)
+        self.asked, self.commanded = sent.k, -1
+        return sent
 
-    def _is_over(self, part: str, action_id: str, asked: int) -> bool:
-        if super()._is_over(part, action_id, asked):
+    def _is_over(self, part: str, sent: Sent) -> bool:
+        if super()._is_over(part, sent):
             return True
         motion = self._motion.get(part)
-        return self.bump is not None and motion is not None and motion.action_id == action_id
+        return self.bump is not None and motion is not None and motion.action_id == sent.id
 
     def _record_bump(self, forces: Forces) -> None:
         if not self._objects.isdisjoint(forces.touched.get(self._part, ())):

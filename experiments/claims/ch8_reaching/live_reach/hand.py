@@ -13,7 +13,7 @@ from experiments.kit.reaching.arm import PART
 from mobee.arrays import Array
 from mobee.reach import RADIUS
 from mobee.robot.robot import Robot
-from services.common.bus_plant import BusPlant
+from services.common.bus_plant import BusPlant, Sent
 from services.common.lockstep import Participant
 from services.common.service import Service
 
@@ -58,10 +58,11 @@ class Hand(BusPlant):
         """
         self._link.on_each(Commands, self._note_commands)
 
-    def _ask(self, part: str, verb: str, request: type[Request], **fields: object) -> int:
+    def _send(self, part: str, verb: str, request: type[Request], action_id: str, **fields: object) -> Sent:
         self.first = -1
-        self.asked = super()._ask(part, verb, request, **fields)
-        return self.asked
+        sent = super()._send(part, verb, request, action_id, **fields)
+        self.asked = sent.k
+        return sent
 
     def _note_reach(self, reach: Reach) -> None:
         self.end = reach.end_k
