@@ -137,9 +137,9 @@ class WorldChanges:
 
     Args:
         detector: decides when the world has changed.
-        planning: has the probabilities of the outcomes of transitions.
-        predictor: has the standard deviations of rewards; if it has none, only repeated reaches are used.
-        failures: the memory of failures; it gets the number of transitions since each change.
+        planning: gives the probabilities of the outcomes of transitions.
+        predictor: gives the standard deviations of rewards; if it has none, only reaches that repeat an earlier reach are informative.
+        failures: the memory of failures; its method `change` is called with the number of transitions since the change.
     """
 
     def __init__(self, detector: Detector, planning: ReachPlanning, predictor: RewardPredictor, failures: FailuresSinceChange) -> None:
@@ -178,6 +178,10 @@ class WorldChanges:
         self._failures.change(since - sum(self._is_reach[-since:]))
         self.detected.append(step.n)
         return True
+
+    def report(self) -> None:
+        """Record a change of the world that is known without detection: only transitions from now on count as made since the change."""
+        self._failures.change(0)
 
     def _variance(self, state: int, target: Array) -> float | None:
         """Return the variance of the reward to expect; None if it is unknown."""

@@ -143,7 +143,7 @@ class ReachLearner:
         """
         problem = self.problems.index(target)
         if problem != self._problem:
-            self._end()
+            self.end_try()
             self._problem = problem
 
     def planned(self) -> tuple[Array, Array]:
@@ -186,12 +186,13 @@ class ReachLearner:
         if self.changes is not None and expected is not None and self.changes.observe(step, self._target, expected):
             self._plan = None
         if step.a == REACH or len(self._made) >= self.limit:
-            self._end()
+            self.end_try()
 
     def replay(self, targets: list[ReachTarget], steps: list[Step]) -> None:
-        """Learn from recorded steps; the number of a target in `targets` is that of its problem.
+        """Learn from recorded steps, in their order.
 
-        If the last problem-try has not ended, its plans are computed too, because the learner continues with them.
+        `targets`: the targets of all problems, in the order of the problems' numbers. `steps`: all recorded steps. If the last problem-try
+        (attempt to reach a target) has not ended, its plans are computed too, because the learner continues with them.
         """
         for target in targets:
             self.problems.index(target)
@@ -199,7 +200,7 @@ class ReachLearner:
         under_way = last if last and last[-1].a != REACH and len(last) < self.limit else []
         for step in steps:
             if step.number != self.tries + 1 or step.problem != self._problem:
-                self._end()
+                self.end_try()
                 self.begin(targets[step.problem])
             if under_way and step.number == under_way[0].number:
                 self.planned()
@@ -229,7 +230,8 @@ class ReachLearner:
         if step.failed:
             self._plan = None
 
-    def _end(self) -> None:
+    def end_try(self) -> None:
+        """End the problem-try under way, if there is one; it counts as a try if it has a step."""
         if self._problem is not None and self._made:
             self.problems.tries[self._problem] += 1
             self.tries += 1
@@ -238,9 +240,10 @@ class ReachLearner:
 
 
 def made_predictor(given: str | RewardPredictor | PredictorOf, reaches: Reaches) -> RewardPredictor:
-    """Return a predictor: made from `reaches` by a class, a function, or the class of this name.
+    """Return the predictor of rewards that `given` specifies.
 
-    A predictor object is returned unchanged. Raises UnknownName.
+    `given`: a predictor, which is returned unchanged; a class or function, which is called with `reaches` to make the predictor; the name
+    of a class in `predictors.PREDICTORS`; or the text `module:name` of a class or function. Raises UnknownName for an unknown name.
     """
     if isinstance(given, str | type) or not isinstance(given, RewardPredictor):
         make: PredictorOf = named("predictor", given, PREDICTORS)[1]  # type: ignore[assignment]  # `named` returns any callable

@@ -67,8 +67,7 @@ class ReachAgent(ReachLearner):
         jacobians: Array | None = None,
         **changes: Any,
     ) -> None:
-        if plant.robot.motors != space.robot.motors:
-            raise InvalidValue(f"the plant moves {plant.robot.name!r}, the space is of {space.robot.name!r}: make both from one robot.")
+        _require_robot(space, plant)
         chosen = ReachSettings.made(settings, changes)
         scale = chosen.scale
         reaches = reaches_of(space, marker, scale) if hands is None else Reaches(space.samples, hands, scale, jacobians)
@@ -115,6 +114,28 @@ class ReachAgent(ReachLearner):
                 self.try_problem(self.problems.least_tried(problems, self.problem_draws()) if target is None else target)
             except ActionInterrupted:
                 continue
+
+    def practise(self, plant: ReachPlant, problems: Sequence[ReachTarget], tries: int) -> None:
+        """Learn from problem-tries on another plant, for example a simulated robot in the world as it is perceived now.
+
+        It saves tries on the robot after a change of the world that is perceived, such as an object that was not there before. With a
+        detector the world counts as changed before the first of these tries. A problem-try under way ends; `tries` and `steps` count the
+        tries and actions on both plants. `plant`: moves the space's robot. `problems`, `tries`: as in `learn`.
+
+        Raises InvalidValue for a plant of another robot, or if the agent has a store, which holds what happened to one robot only.
+        """
+        _require_robot(self.space, plant)
+        if self.store is not None:
+            raise InvalidValue("an agent with a store cannot practise: the store holds the steps of one robot only. Make it without store.")
+        self.end_try()
+        if self.changes is not None:
+            self.changes.report()
+        own = self.plant
+        self.plant, self._state = plant, None
+        try:
+            self.learn(problems, tries)
+        finally:
+            self.plant, self._state = own, None
 
     def plan(self, target: ReachTarget, state: int | None = None) -> ReachPlan:
         """Plan a reach for a target from a state (None: from the present one), without moving or learning."""
@@ -179,3 +200,9 @@ class ReachAgent(ReachLearner):
             touched=outcome.touched,
             **{"expected": 0.0, "missing": 0.0} | rewards,
         )
+
+
+def _require_robot(space: Space, plant: ReachPlant) -> None:
+    """Raise InvalidValue if the plant does not move the robot of the space."""
+    if plant.robot.motors != space.robot.motors:
+        raise InvalidValue(f"the plant moves {plant.robot.name!r}, the space is of {space.robot.name!r}: make both from one robot.")

@@ -18,6 +18,7 @@ from experiments.claims.ch8_reaching.changed_worlds import (
     Hand,
     LikelihoodRatio,
     plant_of,
+    seen_plant,
     targets,
 )
 from experiments.kit.experiment import judged
@@ -39,6 +40,16 @@ def test_the_other_changes_raise_the_table_and_turn_the_joints():
     assert top[1] - top[0] == pytest.approx(0.08)
     plant = plant_of("turn", -1, 0)
     assert isinstance(plant, JudgedPlant) and np.count_nonzero(np.abs(plant.errors.turns) == TURN) == 4
+
+
+def test_an_object_is_seen_with_errors_of_a_centimetre():
+    balls = [seen_plant("ball", 3, seed).model.world.objects["ball"] for seed in range(40)]
+    errors = np.array([ball.position - BALLS[3] for ball in balls])
+    assert np.abs(errors.mean(axis=0)).max() < 0.006 and errors.std() == pytest.approx(0.01, rel=0.25)
+    assert np.std([ball.size[0] for ball in balls]) == pytest.approx(0.005, rel=0.4)
+    tables = [seen_plant("table", -1, seed).model.world.objects["table"].position[2] for seed in range(40)]
+    raised = plant_of("table", -1, 0).model.world.objects["table"].position[2]
+    assert np.mean(tables) == pytest.approx(raised, abs=0.006) and np.std(tables) == pytest.approx(0.01, rel=0.4)
 
 
 def test_the_likelihood_ratio_reports_a_larger_share_once():

@@ -6,6 +6,7 @@ import pytest
 
 from mobee.errors import ActionInterrupted, InvalidValue, MobeeError, UnknownName
 from mobee.learning.reaching.reach_agent import ReachAgent
+from mobee.learning.reaching.store import ReachStore
 from mobee.learning.reaching.tabular import ReachTable
 from mobee.learning.tabular import ideal
 from mobee.learning.transitions import TransitionModel
@@ -269,3 +270,25 @@ def test_a_plant_of_another_robot_is_refused():
     on.robot = load_robot("katana")
     with pytest.raises(InvalidValue, match="make both from one robot"):
         ReachAgent(SPACE, on, marker="hand", hands=HANDS)
+    with pytest.raises(InvalidValue, match="make both from one robot"):
+        agent().practise(on, TARGETS, 1)
+
+
+def test_practice_on_another_plant_is_learned_and_moves_the_own_robot_not_at_all():
+    blocked = [(0, 0)]  # in the world as it is perceived now, there is no path from state 0
+    reacher, imagined = corridor(detector="run_length", touching=False), corridor(blocked, touching=False).plant
+    reacher.learn([GOAL], 5)
+    own, before = reacher.plant, reacher.plant.measure(reacher.part).copy()
+    reacher.begin(GOAL)
+    reacher.practise(imagined, [GOAL], 10)
+    assert reacher.plant is own and own.measure(reacher.part).tolist() == before.tolist()
+    assert (reacher.tries, reacher.under_way, reacher.changes.detected) == (15, None, [])
+    assert reacher.failures.blocked(0, 0) > 0.5
+    assert reacher.failures.rewards(np.ones(3))[0, 0] < -1.0  # for all targets
+
+
+def test_practice_does_not_write_into_a_store(tmp_path):
+    with ReachStore(tmp_path / "steps.sqlite", "left_arm") as store:
+        reacher = corridor(store=store)
+        with pytest.raises(InvalidValue, match="an agent with a store cannot practise"):
+            reacher.practise(corridor().plant, [GOAL], 1)
