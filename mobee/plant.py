@@ -15,9 +15,10 @@ from mobee.robot.robot import Robot
 class Outcome:
     """The outcome of an action: what the plant measures when the action ends.
 
-    `q`: (n_part,) rad, encoder values of the part's motors.  `settled`: False if the action timed out; agents learn from that outcome
-    too.  `duration`: s, by the plant's clock.  `touched`: names of the world objects that touch a solid or field of a link that the part
-    moves.  `perceived`: position (3,) m, root frame, of each object that the plant perceives, by name.
+    `q`: (n_part,) rad, encoder values of the part's motors.  `settled`: False if the action timed out; agents learn from that outcome too.
+    `duration`: s, by the plant's clock.  `touched`: names of the free world objects that touch a link that the part moves, that is, overlap
+    one of its solids or fields (volumes that cause repulsive forces).  `perceived`: position (3,) m, root frame, of each object that the
+    plant perceives, by name; empty if it perceives none.
     """
 
     q: Array
@@ -94,9 +95,10 @@ class PerceivingPlant:
         return self.plant.measure(part)
 
     def act(self, part: str, target: Array) -> Outcome:
-        """Perform an action, as in `mobee.plant.Plant.act`, and add the objects that are perceived at its end to its outcome.
+        """Set the part's attractor, wait until the part has settled or a time limit is over, and return the outcome.
 
-        `target`: (n_part,) rad, the attractor of the part's motors. Raises ActionInterrupted on a hold, a fault or a new run.
+        The outcome has also the objects that are perceived at the end of the action. `target`: (n_part,) rad, the attractor of the part's
+        motors. Raises ActionInterrupted if the action ends without an outcome: by a hold, a fault or a new run of the robot.
         """
         return replace(self.plant.act(part, target), perceived=self.perceive())
 

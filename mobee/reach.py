@@ -70,8 +70,9 @@ class ReachOutcome:
 
     `q`: (n_part,) rad, encoder values at the end of the first phase.  `marker`: (3,) m, root frame, position of the marker that the model
     computes from `q`.  `missing`: m, remaining distance to the target (`ReachTarget.missing`).  `settled`: False if the first phase timed
-    out.  `duration`: s of both phases, by the plant's clock.  `touched`: names of the world objects that touch a solid or field of a link
-    that the part moves, at the end of the first phase.  `after`: outcome of the second phase.
+    out.  `duration`: s of both phases, by the plant's clock.  `touched`: names of the free world objects that at the end of the first phase
+    touch a link that the part moves, that is, overlap one of its solids or fields (volumes that cause repulsive forces).  `after`: outcome
+    of the second phase.
     """
 
     marker: Array

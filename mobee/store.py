@@ -160,7 +160,8 @@ class TransitionStore(AgentFile):
         durable: False: a transition survives a kill but not a power cut; for learning offline.
 
     Raises:
-        MobeeError: from every method; InUse and NoRoom as in `mobee.store.AgentFile`.
+        MobeeError: from every method; InUse: another process writes this agent's data; NoRoom: the disk is full, and the same call succeeds
+            when there is room.
     """
 
     def __init__(self, path: str | Path, agent: str, read_only: bool = False, durable: bool = True) -> None:

@@ -56,10 +56,11 @@ def library() -> ctypes.CDLL:
 
 
 def choose(forced: str, flags: Iterable[str], folder: Path = FOLDER) -> str:
-    """Return the name of the build of the core to load.
+    """Return the name of the build of the core to load; a build is the library compiled for one level of processors, such as "x86-64-v3".
 
-    `forced`: name of the requested build; "": the build of the highest level in `folder` that runs on a processor with these `flags`.
-    Raises CoreUnavailable if the requested build is unknown or does not run here, or if no build runs here.
+    `forced`: name of the requested build; "": the build of the highest level in `folder` that runs on a processor with these `flags`, the
+    names of features in /proc/cpuinfo. Raises CoreUnavailable if the requested build is unknown or does not run here, or if no build runs
+    here.
     """
     flags = frozenset(flags)
     known, possible = machine_levels(), possible_levels(flags)
@@ -79,10 +80,10 @@ def choose(forced: str, flags: Iterable[str], folder: Path = FOLDER) -> str:
 
 
 def load(level: str, folder: Path = FOLDER) -> ctypes.CDLL:
-    """Load the build of the core for a level, such as "x86-64-v3", and return the library.
+    """Load the build of the core for a level of processors, such as "x86-64-v3", and return the library.
 
-    Raises CoreUnavailable if the file is missing, cannot be loaded, was built from other sources than those of this checkout, or has
-    another interface than the one declared here.
+    Raises CoreUnavailable if the file is missing, cannot be loaded, was built from other sources than those of this checkout, or its
+    interface has another version than ABI.
     """
     file = library_file(level, folder)
     if not file.exists():
@@ -100,7 +101,7 @@ def load(level: str, folder: Path = FOLDER) -> ctypes.CDLL:
 
 
 def function(name: str, *arguments: Any, result: Any = None) -> Callable[..., Any]:
-    """Return a function of the core; `name`: without the prefix `mobee_`.
+    """Return a compiled function of the core as a Python function; `name`: its name without the prefix `mobee_`.
 
     `arguments`, `result`: the ctypes types of its arguments and its result. Python's global lock (GIL) is released while it runs.
     """

@@ -111,8 +111,9 @@ _room_rows = function("room_rows", ADDRESS, ADDRESS)
 _rows_end = function("rows_end", ADDRESS)
 _evaluate = function("evaluate", ADDRESS, ADDRESS, result=INTEGER)
 evaluate_one = function("evaluate_one", result=INTEGER)
-"""Evaluate one pose and return the number of its contacts. Arguments: `Room.asked`, and the pose q (n,) rad as bytes of float64. The
-contacts are written into `Room.rows`, the projection into `Room.torque`. The argument types are not declared, because this is faster."""
+"""Evaluate one pose in the compiled core and return the number of its contacts. Arguments: `Room.asked`, and the pose q (n,) rad as bytes
+of float64. At most `Room.most` contacts are written into `Room.rows`, the projection of the contacts to the motors into `Room.torque`. The
+argument types are not declared, because this is faster."""
 _link_poses = function("link_poses", ADDRESS, BYTES, INTEGER, ADDRESS)
 _jacobians = function("jacobians", ADDRESS, BYTES, INTEGER, INTEGER, BYTES, ADDRESS)
 _neighbours_new = function("neighbours_new", REAL, INTEGER, result=ADDRESS)
@@ -130,20 +131,21 @@ _swung = function("swung", ADDRESS, ADDRESS, ADDRESS, ADDRESS)
 
 
 def robot(numbers: Mapping[str, float], arrays: Mapping[str, NDArray[Any]]) -> Handle:
-    """Make a robot of the core from tables, which the core copies, and return its handle.
+    """Make a robot in the compiled core from tables, which the core copies; return the handle that owns the robot.
 
-    `numbers`, `arrays`: by name, as `mobee.model.robot_tables.RobotTables.for_core` returns them.
+    `numbers`, `arrays`: the single numbers and the arrays of the tables, by name, as `mobee.model.robot_tables.RobotTables.for_core`
+    returns them.
     """
     tables = _RobotTables(**numbers, **{name: address(array) for name, array in arrays.items()})
     return Handle(_robot_new(ctypes.addressof(tables)), _robot_free)
 
 
 def scene(of: Handle, volumes: NDArray[Any], roles: Ints, carried: Ints, side: int) -> Handle:
-    """Make a scene of the core, a robot and the objects of a world, and return its handle.
+    """Make a scene in the compiled core, that is, a robot and the objects of a world; return the handle that owns the scene.
 
-    `of`: handle of the robot. `volumes` (N,) and `roles` (N,): of the world's objects, as in `mobee.model.snapshot.Snapshot`. `carried`:
-    indices of the objects that the robot carries. `side`: number of cells along the longest side of the grid into which the free objects
-    are sorted.
+    `of`: handle of the robot. `volumes` (N,) and `roles` (N,): volume and role of each object of the world, as in
+    `mobee.model.snapshot.Snapshot`. `carried`: indices of the objects that the robot carries. `side`: number of cells along the longest
+    side of the grid into which the free objects are sorted.
     """
     tables = _WorldTables(len(roles), len(carried), side, address(volumes), address(roles), address(carried))
     return Handle(_scene_new(of.at, ctypes.addressof(tables)), _scene_free, of)
@@ -152,7 +154,7 @@ def scene(of: Handle, volumes: NDArray[Any], roles: Ints, carried: Ints, side: i
 def link_poses(of: Handle, q: Array, links: int) -> Array:
     """Return the transforms (B, L, 4, 4) of all links in the poses q (B, n) rad, root frame.
 
-    A transform maps a point's position at zero pose to its position at q. `of`: handle of the robot. `links`: their number L.
+    A transform maps a point's position at zero pose to its position at q. `of`: handle of the robot. `links`: the number L of links.
     """
     out = np.empty((len(q), links, 4, 4))
     _link_poses(of.at, q.tobytes(), len(q), address(out))
@@ -162,7 +164,7 @@ def link_poses(of: Handle, q: Array, links: int) -> Array:
 def jacobians(of: Handle, q: Array, link: int, point: Array) -> Array:
     """Return the Jacobians (B, 6, n) of a point that is fixed to a link, in the poses q (B, n) rad: linear rows, then angular, root frame.
 
-    `of`: handle of the robot. `link`: index. `point` (3,) m: position of the point in the root frame at zero pose.
+    `of`: handle of the robot. `link`: index of the link. `point` (3,) m: position of the point in the root frame at zero pose.
     """
     out = np.empty((len(q), 6, q.shape[1]))
     _jacobians(of.at, q.tobytes(), len(q), link, point.tobytes(), address(out))
@@ -170,10 +172,10 @@ def jacobians(of: Handle, q: Array, link: int, point: Array) -> Array:
 
 
 class Room:
-    """The buffers of an evaluation, for one thread at a time; they are reused, because allocating memory takes longer than one pose.
+    """Buffers in which the core evaluates poses, for one thread at a time; they are reused, because allocation takes longer than one pose.
 
-    `rows`: buffer for the contacts of `evaluate_one`, at most `most` of them. `torque`: buffer for their projection. `asked`: the first
-    argument of `evaluate_one`.
+    `rows`: buffer into which `evaluate_one` writes at most `most` contacts. `torque`: buffer for the projection of the contacts to the
+    motors, (n,) m^2/rad. `asked`: the first argument of `evaluate_one`.
     """
 
     __slots__ = ("_at", "_handle", "_request", "asked", "most", "rows", "torque")
@@ -189,11 +191,13 @@ class Room:
         self.make_space(MANY)
 
     def evaluate(self, scene: Handle, q: Array, hands: Sequence[int], cut: bool, threads: int) -> tuple[Ints, Array, Array]:
-        """Return the contacts in the poses q (B, n) rad, and the projection of the contacts of fields to the motors, (B, n) m^2/rad.
+        """Return the contacts in the poses q (B, n) rad, and their projection to the motors, (B, n) m^2/rad.
 
-        The contacts are two arrays: numbers (c, 6) and reals (c, 7), the columns of `mobee.model.contact.ContactTable`. `scene`: its
-        handle. `hands`: four links of reaching hands (`mobee.model.snapshot.hand_numbers`), which targets do not repel. `cut`: whether a
-        contact acts only on the motors of its own part. `threads`: their number.
+        The contacts are two arrays: numbers (c, 6) and reals (c, 7), the columns of `mobee.model.contact.ContactTable`. The projection is
+        the sum of J^T (depth * normal) over the contacts of fields, volumes that cause repulsive forces; J is the Jacobian of the contact's
+        point. `scene`: handle of the scene. `hands`: the reaching hands as four link indices (`mobee.model.snapshot.hand_numbers`); their
+        contacts with targets are ignored. `cut`: True: a contact acts only on the motors of the part that touches, as in the program of
+        2014; False: also on the motors nearer to the base. `threads`: number of threads.
         """
         torque = np.empty(q.shape)
         request = _Request(scene.at, address(q), address(torque), len(q), cut, threads, (INTEGER * 4)(*hands))
@@ -201,20 +205,21 @@ class Room:
         return *_rows(_room_rows, self._at, count), torque
 
     def ask(self, scene: Handle, hands: Sequence[int], cut: bool) -> None:
-        """Set scene, hands and `cut` for the next calls of `evaluate_one`; they have the meanings as in `evaluate`.
+        """Set the scene, the reaching hands and `cut` for the next calls of `evaluate_one`.
 
-        The caller keeps the scene alive.
+        `scene`: handle of the scene; the caller keeps it alive. `hands`: four link indices (`mobee.model.snapshot.hand_numbers`); contacts
+        of these hands with targets are ignored. `cut`: whether a contact acts only on the motors of its own part.
         """
         self._request.scene, self._request.hands[:], self._request.cut = scene.at, hands, cut
 
     def make_space(self, most: int) -> None:
-        """Allocate the buffer `rows`, into which `evaluate_one` writes up to `most` contacts."""
+        """Allocate a new buffer `rows`, into which `evaluate_one` writes up to `most` contacts."""
         self.most, self.rows = most, bytearray(most * ROW_BYTES)
         self._request.most, self._request.rows = most, address(np.frombuffer(self.rows, dtype=np.uint8))
 
 
 class Following:
-    """A neighbour list of a robot in a scene: the pairs of volumes that are near each other, for consecutive poses; for one thread.
+    """A neighbour list of a robot in a scene: the pairs of volumes that are near each other in consecutive poses; for one thread at a time.
 
     `skin`: m; pairs nearer than this are in the list, which is made again when two volumes may have approached each other by the skin.
     `cut`: whether a contact acts only on the motors of its own part. `at`: address of the list in the core, which a plant of the core uses;
@@ -227,24 +232,31 @@ class Following:
         self._scene: Handle | None = None
 
     def enter(self, scene: Handle, hands: Sequence[int]) -> None:
-        """Set the scene, by its handle, and the reaching hands, four links as in `Room.evaluate`, which targets do not repel."""
+        """Set the scene and the reaching hands for the next poses.
+
+        `scene`: handle of the scene, which is kept alive. `hands`: four link indices (`mobee.model.snapshot.hand_numbers`); contacts of
+        these hands with targets are ignored.
+        """
         self._scene = scene  # before the core releases the last one, which has no other user
         numbers = (INTEGER * 4)(*hands)
         _neighbours_enter(self.at, scene.at, ctypes.addressof(numbers))
 
     def follow(self, q: Array) -> tuple[Ints, Array, Array]:
-        """Return the contacts in the consecutive poses q (B, n) rad, and the projection of those of fields to the motors, (B, n) m^2/rad.
+        """Return the contacts in the consecutive poses q (B, n) rad, and their projection to the motors, (B, n) m^2/rad.
 
-        The contacts are numbers (c, 6) and reals (c, 7), as in `Room.evaluate`.
+        The contacts are two arrays: numbers (c, 6) and reals (c, 7), the columns of `mobee.model.contact.ContactTable`. The projection is
+        the sum of J^T (depth * normal) over the contacts of fields, volumes that cause repulsive forces; J is the Jacobian of the contact's
+        point.
         """
         torque = np.empty(q.shape)
         count = _follow(self.at, q.tobytes(), len(q), address(torque))
         return *_rows(_neighbours_rows, self.at, count), torque
 
     def state(self) -> tuple[int, int, int]:
-        """Return three numbers, for tests: the state of the list, the number of pairs in it, and for how many poses it was used.
+        """Return three numbers, for tests: the state of the list, the number of pairs in it, and the number of poses for which it was used.
 
-        States: 0 empty, 1 only the last pose is stored, 2 a list, 3 the last pose, and the list is outdated.
+        States: 0: the list is empty; 1: only the last pose is stored; 2: the pairs are stored; 3: only the last pose is stored, because the
+        list became outdated.
         """
         found = np.empty(3, dtype=np.int64)
         _neighbours_state(self.at, address(found))
@@ -263,7 +275,7 @@ def swung(of: Handle, then: Array, now: Array, shapes: int) -> Array:
     """Return upper bounds (S, L) m of the motion of each shape between two poses, for tests.
 
     Column k is the motion as seen from the link that carries both the shape and link k. `of`: handle of the robot. `then`, `now`: (J,)
-    joint positions [rad or m]. `shapes`: their number S.
+    joint positions [rad or m]. `shapes`: the number S of shapes.
     """
     out = np.empty((shapes, len(then) + 1))
     _swung(of.at, address(then), address(now), address(out))
@@ -273,7 +285,7 @@ def swung(of: Handle, then: Array, now: Array, shapes: int) -> Array:
 def place(of: Handle, q: Array, shapes: int) -> NDArray[Any]:
     """Return all shapes of a robot at q (n,) rad, (S,) rows of `mobee._core.narrow.VOLUME`, in the order of the robot's tables.
 
-    `of`: handle of the robot. `shapes`: their number S.
+    The volumes are in the root frame. `of`: handle of the robot. `shapes`: the number S of shapes.
     """
     out = np.zeros(shapes, dtype=VOLUME)
     _place(of.at, address(q), address(out))
@@ -281,21 +293,25 @@ def place(of: Handle, q: Array, shapes: int) -> NDArray[Any]:
 
 
 class Grid(NamedTuple):
-    """The grid of a scene, in which the free objects of the world are sorted by cell.
+    """The grid of cells by which the compiled core sorts the free world objects of a scene to find contacts.
 
     `large`: number of large objects, which come first and are in no cell. `cells`: number of cells along x, y and z. `starts`: (cells + 1,)
-    first object of each cell. `objects`: (N, 2), index of each object in the world, and whether it is a target. `centers`: (N, 3) m.
+    first object of each cell. `objects`: (N, 2), index of each object in the world, and 1 if it is a target, else 0. `centers`: (N, 3) m,
+    of these objects, root frame.
     """
 
     large: int
-    cells: tuple[int, ...]  # along x, y and z
-    starts: Ints  # (cells + 1,)
-    objects: Ints  # (objects, 2): index of each object in the world, and whether it is a target
-    centers: Array  # (objects, 3) m
+    cells: tuple[int, ...]
+    starts: Ints
+    objects: Ints
+    centers: Array
 
 
 def grid_of(scene: Handle) -> Grid:
-    """Return the grid of a scene, for tests; `scene`: its handle."""
+    """Return the grid of cells by which the compiled core sorts the free world objects of a scene to find contacts; only for tests.
+
+    `scene`: handle of the scene in the core.
+    """
     counts = np.empty(5, dtype=np.int64)
     _scene_counts(scene.at, address(counts))
     objects, large, *cells = counts.tolist()

@@ -71,7 +71,10 @@ _VECTOR, _TWIST = 3 * REAL, 6 * REAL
 
 
 class Reach(ctypes.Structure):
-    """A reach in progress, as the core has it (core/reach.hpp); the caller keeps the tables alive to which it points."""
+    """A reach in progress, as the core has it (core/reach.hpp): a force pulls a marker to a target.
+
+    The caller keeps the tables alive to which the structure points.
+    """
 
     _fields_ = (
         *((name, INTEGER) for name in ("part", "to_surface", "turns_normal", "faces_target", "joint_count")),
@@ -85,7 +88,7 @@ class Reach(ctypes.Structure):
 
 
 class Calls:
-    """The compiled functions of core/law.cpp and core/reach.cpp, as attributes; the C++ files document their arguments."""
+    """The compiled functions of the control law and of reaches, as attributes; core/law.cpp and core/reach.cpp document their arguments."""
 
     def __init__(self) -> None:
         self.forces = function("law_forces", ADDRESS, ADDRESS, ADDRESS, ADDRESS, ADDRESS)
@@ -102,13 +105,16 @@ calls = cache(Calls)
 
 @cache
 def term_names() -> tuple[str, ...]:
-    """Return the names of the forces of the law, in the order in which the core computes and adds them."""
+    """Return the names of the forces of the control law, in the order in which the core computes and adds them."""
     name = function("law_term", INTEGER, result=ctypes.c_char_p)
     return tuple(term.decode() for term in takewhile(bool, map(name, count())))
 
 
 @cache
 def state_term_names() -> tuple[str, ...]:
-    """Return the names of the forces that depend on the state of the law (STATE), such as its velocity, not only on q and the contacts."""
+    """Return the names of the forces that depend on the state of the control law, such as its velocity.
+
+    All other forces depend only on q and the contacts.
+    """
     needs_state = function("law_needs_state", INTEGER, result=INTEGER)
     return tuple(name for index, name in enumerate(term_names()) if needs_state(index))

@@ -31,11 +31,11 @@ class Table(ctypes.Structure):
 
 
 class TransitionTable:
-    """A transition model for the core: a `Table`, and the arrays to which it points, which are kept alive.
+    """A transition model in the form that the compiled core reads: a `Table`, and the arrays to which it points, which are kept alive.
 
-    `probabilities`, `outcomes`: (S, A, B), C-contiguous, probability and outcome (a state) of each bin of each state-action. `used` (S, A):
-    number of bins in use of each state-action; the bins after them have probability 0. None: all are in use. `at`: address of the `Table`.
-    `rows`: the shape (S, A).
+    `probabilities`, `outcomes`: (S, A, B), C-contiguous; for each state-action, B bins, each with an outcome (index of a state) and its
+    probability. `used` (S, A): number of bins in use of each state-action; the other bins have probability 0. None: all bins are in use.
+    `at`: address of the `Table`. `rows`: the shape (S, A).
     """
 
     def __init__(self, probabilities: Array, outcomes: Ints, used: Ints | None = None) -> None:
@@ -53,15 +53,17 @@ solve: Callable[[int, int, int, int, float, float, bool, bool], int] = function(
 
 Arguments: the addresses of a `Table`, of the rewards (S, A), of the values (S,), which change in place, and of the action values (S, A),
 which are filled; the discount; the tolerance; whether the tolerance is in units of the largest reward; whether to run modified policy
-iteration. Errors: BAD_REWARD (-1), BAD_OUTCOME (-2) and BAD_START (-3).
+iteration. Errors: BAD_REWARD (-1): a reward is not finite; BAD_OUTCOME (-2): an outcome is no state; BAD_START (-3): a start value is not
+finite.
 """
 
 
 class DebiasedCounts(ctypes.Structure):
-    """The debiased probabilities of a transition model for the core, `DebiasedCounts` of core/observations.cpp.
+    """The structure `DebiasedCounts` of core/observations.cpp: probabilities from real outcomes and a weak prior.
 
-    It keeps the arrays to which it points alive. `probabilities`: (S, A, B), which `believe` computes. `prior`: the weights of the weak
-    prior; `total`: their sum. `at`: address of the structure.
+    They do not contain the imagined outcomes (pseudo-counts from before the first try). The structure keeps the arrays to which it points
+    alive. `probabilities`: (S, A, B), which `believe` computes. `prior` (B,): the prior's weight of each bin; `total`: the sum of the
+    prior. `at`: address of the structure.
     """
 
     _fields_ = (("probability", ADDRESS), ("prior", ADDRESS), ("sum", REAL))
@@ -75,9 +77,10 @@ class DebiasedCounts(ctypes.Structure):
 class OutcomeCounts(ctypes.Structure):
     """The counts of a transition model for the core, `OutcomeCounts` of core/observations.cpp; observations write into its arrays.
 
-    It keeps the arrays to which it points alive. `arrays`: by name of the field. `over_states`: number of states over which the reward is
-    computed, each imagined once; 0: over the bins of the state-action. `forgetting`: factor on earlier counts. `at`: address of the
-    structure. States, actions and outcomes are not checked.
+    It keeps the arrays to which it points alive. `arrays`: the arrays by the name of the structure's field, such as "count" (S, A, B).
+    `over_states`: 0: the reward is computed over the outcomes of the state-action; above 0: over this number of states, each with one count
+    before the first observation. `forgetting`: factor by which earlier real counts are multiplied at each observation. `at`: address of the
+    structure. The indices of states, actions and outcomes are not checked.
     """
 
     _fields_ = (
@@ -123,8 +126,8 @@ _deplete = function("deplete", ADDRESS, ADDRESS, ADDRESS, INTEGER, INTEGER, ADDR
 def expected_gains(table: TransitionTable, counts: Array, totals: Array, tries: Ints, gains: Array) -> None:
     """Replace the `gains` (S, A) of all tried state-actions by the expected information gain of their next try [nats], in place.
 
-    `counts` (S, A, B): the counts of the outcomes, above 0 wherever the probability is above 0. `totals` (S, A): sums of `counts` over the
-    bins. `tries` (S, A): how often each state-action was tried; gains of untried ones are not changed.
+    `counts` (S, A, B): the count of the outcome in each bin, above 0 wherever the probability is above 0. `totals` (S, A): sums of `counts`
+    over the bins. `tries` (S, A): how often each state-action was tried; gains of untried ones are not changed.
     """
     following = _NextCounts(address(counts), address(totals))
     _expected_gains(table.at, ctypes.addressof(following), address(tries), address(gains))
@@ -157,12 +160,12 @@ _gaussian_sums = function("gaussian_sums", ADDRESS, INTEGER, INTEGER, ADDRESS, I
 def weighted_sums(
     targets: Array, keys: Ints, sums: Array, sizes: tuple[int, int], weighing: tuple[float, float], target: Array, out: Array
 ) -> None:
-    """Sum the recorded values of each action, weighted by the distance of their targets from `target` (3,) m.
+    """Sum the recorded values of each action, weighted by the distances of the recorded targets from `target` (3,) m.
 
-    `out` (2, actions): the sums of the weighted values, and the sums of the weights, are added to it. `targets` (..., 3) m: the targets of
-    the record. `keys` (..., 2): action and index of the target of each entry of the record; `sums` (..., 2): sum and number of the values
-    of each entry; `sizes`: number of targets and of entries.  `weighing`: a scale and a largest distance [m]: the weight of a target at a
-    distance d is 1 / (1 + d / scale), and 0 beyond the largest distance.
+    `out` (2, actions): the sums of the weighted values, and the sums of the weights, are added to it. The record has `sizes[0]` targets, in
+    the first rows of `targets` (..., 3) m, and `sizes[1]` entries, in the first rows of `keys` and `sums`. `keys` (..., 2): action, and
+    index of the target, of each entry; `sums` (..., 2): sum and number of the values of each entry. `weighing`: a scale and a largest
+    distance [m]: the weight of a target at a distance d is 1 / (1 + d / scale), and 0 beyond the largest distance.
     """
     history = _History(address(targets), address(keys), address(sums), *sizes, *weighing)
     totals = address(out)

@@ -30,12 +30,13 @@ _descend = function("descend", ADDRESS, result=INTEGER)
 def descend(
     robot: Handle, aims: Ints, goals: Array, free: Ints, limits: tuple[Array, Array], steps: int, q: Array, threads: int
 ) -> tuple[int, Array]:
-    """Move the free motors of every start pose so that it satisfies the aims, by least squares; `q` (B, n) rad changes in place.
+    """Move the free motors of every start pose, by least squares, until it satisfies the aims; `q` (B, n) rad changes in place.
 
-    Return the number of poses that were evaluated, and the residuals (B, K) of the K aims. `robot`: its handle. `aims` (K, 4): rows `Aim`
-    of core/aims.hpp (kind, first link, second link, motor). `goals`: `Goal`s of all aims (core/aims.hpp), in one row for all starts or in
-    one row for each start. `free` (d,): indices of the free motors. `limits`: their lowest and highest positions, each (d,) rad. `steps`:
-    largest number of steps for a start.
+    An aim is a condition on the pose: for example, a point of a link shall be at a given place. Returns the number of poses that were
+    evaluated, and the remaining errors (B, K) of the K aims [m or rad]. `robot`: handle of the robot in the core. `aims` (K, 4): kind,
+    first link, second link and motor of each aim (`Aim` in core/aims.hpp). `goals`: the goals of all aims (`Goal` in core/aims.hpp), in one
+    row for all starts or in one row for each start. `free` (d,): indices of the free motors. `limits`: the lowest and the highest positions
+    of the free motors, each (d,) rad. `steps`: largest number of steps for a start. `threads`: number of threads.
     """
     residuals = np.empty((len(q), len(aims)))
     low, high = limits

@@ -27,14 +27,20 @@ NEEDS = {
 
 
 def machine_levels() -> tuple[str, ...]:
-    """Return the names of the builds for this kind of machine, such as "x86-64-v2", the lowest level first; ("generic",) on others."""
+    """Return the names of the builds of the core that exist for this kind of machine, the lowest level first.
+
+    They are the levels of x86-64, such as "x86-64-v2", on Linux on such a processor, and ("generic",) on any other machine.
+    """
     if sys.platform == "linux" and platform.machine() == "x86_64":
         return tuple(NEEDS)
     return (GENERIC,)
 
 
 def missing(level: str, flags: Iterable[str]) -> list[str]:
-    """Return the processor flags that a level needs and that are not in `flags`, sorted; empty if the level is unknown."""
+    """Return the processor features that a level such as "x86-64-v3" needs and that are not in `flags`, sorted.
+
+    `flags`: names of the processor's features, as in /proc/cpuinfo. The result is empty for an unknown level.
+    """
     if level not in NEEDS:
         return []
     needed = [flag for name in NEEDS if name <= level for flag in NEEDS[name]]
@@ -42,13 +48,19 @@ def missing(level: str, flags: Iterable[str]) -> list[str]:
 
 
 def possible_levels(flags: Iterable[str]) -> list[str]:
-    """Return the names of the builds that a processor with these flags runs, the lowest level first."""
+    """Return the names of the builds of the core that a processor with these features runs, the lowest level first.
+
+    `flags`: names of the features, as in /proc/cpuinfo.
+    """
     flags = frozenset(flags)
     return [level for level in machine_levels() if not missing(level, flags)]
 
 
 def processor_flags(cpuinfo: Path = Path("/proc/cpuinfo")) -> frozenset[str]:
-    """Return the flags of this processor, as the kernel gives them in the file `cpuinfo`; without that file, the flags of x86-64-v2."""
+    """Return the names of this processor's features, as the kernel gives them in the file `cpuinfo`.
+
+    Without that file, or without flags in it, the features of x86-64-v2 are returned.
+    """
     try:
         lines = cpuinfo.read_text().splitlines()
     except OSError:

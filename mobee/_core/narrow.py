@@ -95,9 +95,10 @@ class Volumes:
 
 
 def overlaps(first: Volumes, second: Volumes) -> tuple[Reals, NDArray[Any]]:
-    """Return the depths (p,) m and the touches (p,) of p pairs of volumes, first[i] with second[i]; NaN for a pair that does not touch.
+    """Return the depths (p,) m and the touches (p,) of p pairs of volumes, first[i] with second[i].
 
-    A touch is a row of TOUCH: normal (3,) and point (3,) m, root frame.
+    A touch is a row of TOUCH, in the root frame: the unit normal (3,) in whose direction the first volume must move by the depth to leave
+    the second one, and the point (3,) m of the contact. Depth and touch are NaN for a pair that does not touch.
     """
     depth, touch = np.empty(len(first)), np.zeros(len(first), dtype=TOUCH)
     touch["normal"] = touch["point"] = np.nan

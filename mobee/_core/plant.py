@@ -36,7 +36,7 @@ ALL_TICKS_DONE, ACTION_ENDED, STATE_LOST = range(3)
 
 
 class Motors(ctypes.Structure):
-    """The motors of a plant, as the core has them (core/motors.cpp); the caller keeps the tables alive to which it points."""
+    """The motors of a simulated robot, as the core has them (core/motors.cpp); the caller keeps the tables alive to which it points."""
 
     _fields_ = (
         ("living", View), ("constants", View), ("state", ADDRESS), ("line", ADDRESS), ("rows", INTEGER), ("newest", INTEGER),
@@ -45,9 +45,9 @@ class Motors(ctypes.Structure):
 
 
 class Braking(ctypes.Structure):
-    """The limits of the references of n motors, and their commanded velocities, each (n,), as the core has them.
+    """The tables with which the core limits the commands of n motors so that they can always brake before their limits.
 
-    The caller keeps the arrays alive.
+    They are the limits of the positions and the commanded velocities, each (n,). The caller keeps the arrays alive.
     """
 
     _fields_ = (
@@ -57,7 +57,7 @@ class Braking(ctypes.Structure):
 
 
 class Plant(ctypes.Structure):
-    """A plant, as the core has it (core/plant.cpp); the caller keeps everything alive to which it points."""
+    """A plant (simulated robot under the control law), as core/plant.cpp has it; the caller keeps everything alive to which it points."""
 
     _fields_ = (
         *((name, ADDRESS) for name in ("neighbours", "law", "law_state", "attractor", "client", "forces")),
@@ -77,7 +77,7 @@ STRUCTURES = (
 
 
 class Calls:
-    """The compiled functions of core/motors.cpp and core/plant.cpp, as attributes; the C++ files document their arguments."""
+    """The compiled functions of motors and plants, as attributes; core/motors.cpp and core/plant.cpp document their arguments."""
 
     def __init__(self) -> None:
         self.enter = function("motors_enter", ADDRESS, INTEGER, INTEGER)

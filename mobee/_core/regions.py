@@ -38,14 +38,15 @@ class Region:
 
 
 def regions(likeness: NDArray[np.float32], least: float, around: int) -> list[Region]:
-    """Return the regions of a colour in a picture: sets of pixels of this colour that are connected by their sides.
+    """Return the regions of a colour in a picture: sets of pixels of this colour, each pixel connected with others by its sides.
 
     Regions that are connected with each other only by corners of pixels follow each other in the result.
 
     Args:
-        likeness: how much of the colour is in each pixel (H, W), 0 for none; proportional to the fraction of the pixel with the colour.
+        likeness: how much of the colour is in each pixel (H, W), proportional to the share of the pixel that has the colour; 0: none.
         least: smallest area of a region, in pixels.
-        around: side, in pixels (odd), of the square in which the likeness of a pixel that is completely of the colour is searched.
+        around: side, in pixels (odd), of a square around each pixel. The largest likeness in the square, at least 1, is taken as that of a
+            pixel that is completely of the colour; the share of the middle pixel is its likeness divided by this value.
     """
     likeness = np.ascontiguousarray(likeness, dtype=np.float32)
     smallest = max(1, int(np.ceil(least)))

@@ -33,7 +33,7 @@ _silhouette = function("silhouette", ADDRESS)
 
 
 class Silhouette:
-    """The outline of a shape in the picture of one camera, with which the computed silhouette of the shape is compared many times."""
+    """The outline of a shape in the picture of one camera, stored so that it can be compared with many computed silhouettes."""
 
     def __init__(
         self,
@@ -85,16 +85,16 @@ class Silhouette:
         )
 
     def rows(self, position: Array, turn: Array, touching: tuple[Array, Array], errors: Array) -> tuple[Array, Array]:
-        """Return the distances of the m points from the silhouette, (m,) px, positive outside, and their derivatives (m, p).
+        """Return the distances of the outline's m points from the computed silhouette, (m,) px, and their derivatives (m, p).
 
-        The p columns are of the position (3), the lengths of the shape, the angle about the vertical (if unknown), and the errors. The next
-        call overwrites both arrays.
+        A distance is positive outside. The p columns are the derivatives by the position (3), by the lengths of the shape, by the angle
+        about the vertical (if it is unknown), and by the errors. The next call overwrites both arrays.
 
         Args:
             position: position of the shape's middle, (3,) m, root frame.
             turn: rotation of the shape's axes, (3, 3), root frame.
-            touching: the points (K, 3) m at which lines along the normals touch the shape, relative to its middle, in the camera's axes,
-                and the distances (K,) of their images along the normals.
+            touching: the points (K, 3) m of the shape that are farthest along the K normals, relative to its middle, in the camera's axes,
+                and the coordinates (K,) of their images along the normals.
             errors: the errors of the cameras and outlines, in standard deviations.
         """
         given, (offsets, farthest) = self._given, (np.ascontiguousarray(array, dtype=np.float64) for array in touching)

@@ -47,7 +47,7 @@ class Assistance:
 
 
 class Assist:
-    """Chooses postures of a part that carries an arm, from which the arm reaches a target well."""
+    """Chooses postures of a part that carries an arm, such as the torso, from which the arm reaches a target well."""
 
     def __init__(self, model: Model, part: str, arm: str, worth: Worth, levels: int = LEVELS) -> None:
         """Prepare the postures that are compared: a grid over the motors of the part.
@@ -77,8 +77,8 @@ class Assist:
     def posture(self, q: Array, target: Array) -> Assistance:
         """Return the best posture of the part for a target (3,) m, root frame; all other motors stay at q (n,) rad.
 
-        Postures in which solids touch are left out. Large motions count as a disadvantage; the part stays at its present posture if no
-        other posture is better by at least 0.05.
+        The score of a posture is the worth of the target for the arm (at most 1), minus 0.1 per rad^2 of motion. The part stays at its
+        present posture if no posture without contacts of solids has a score that is better by more than 0.05.
         """
         span = self.part.slice
         postures = np.concatenate([q[None, span], self._postures])
@@ -105,7 +105,7 @@ def base_link(robot: Robot, arm: str) -> int:
 def learned_worth(predictor: RewardPredictor) -> Worth:
     """Return a function of places (k, 3) m: the largest reward that a reach learner predicts for a target at each place, (k,).
 
-    The maximum is over all states of the learner's space.
+    The maximum is over all states that the learner `predictor` has.
     """
     return lambda places: np.array([float(predictor.mean(place).max()) for place in places])
 
@@ -121,7 +121,7 @@ def manipulability_worth(robot: Robot, arm: str, marker: str, seed: int = 0) -> 
         robot: the robot, whose other parts are at home.
         arm: the part that reaches.
         marker: name of the marker with which the arm reaches.
-        seed: of the random postures.
+        seed: seed of the random postures.
     """
     model, span = Model(robot), robot.part(arm).slice
     q = np.repeat(robot.home[None], SAMPLES, axis=0)

@@ -46,7 +46,7 @@ class Movement:
     q: Array
     velocity: Array
     phase: Phase
-    error: float  # rad, the largest angle between a direction of view and the target now
+    error: float
 
 
 class Gaze:
@@ -200,8 +200,9 @@ class Gaze:
 def gaze_motors(robot: Robot, part: str, links: Iterable[int], movable: NDArray[np.bool_] | None = None) -> tuple[Ints, Ints]:
     """Return the indices of the motors of a part that move at least one of the links: the eyes and the neck.
 
-    The eyes are the motors that move no shape, the neck the others. `links`: numbers of the links that carry cameras. `movable`: (n,)
-    whether each motor may be moved; None: all. Raises InvalidValue if there are no such motors, and UnknownName for an unknown part.
+    The result has the indices of the eyes' motors, which move no shape, and those of the neck, which are all others. `links`: numbers of
+    the links that carry cameras. `movable`: (n,) whether each motor may be moved; None: all. Raises InvalidValue if there are no such
+    motors, and UnknownName for an unknown part.
     """
     span, matrix, ancestry = robot.part(part).slice, robot.coupling[0], tables(robot).ancestry
     turning, bodies = (np.zeros(len(robot.motors), dtype=bool) for _ in range(2))

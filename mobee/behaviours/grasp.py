@@ -34,8 +34,8 @@ class Grip:
         along: m, from the palm's marker to the thing's axis, along the fingers.
         gap: m, between palm and thing when the hand closes.
         before: m, between palm and thing at the pre-grasp.
-        height: m, of the palm above the ground on which the thing stands; at this height the fields of hand and forearm do not reach the
-            ground.
+        height: m, of the palm above the ground on which the thing stands; at this height the ground does not touch the fields of hand and
+            forearm (volumes that cause repulsive forces).
         oppose: rad, opposition of the thumb.
         spread: rad, spread of the fingers.
         fingers: share by which the fingers close, 0 open to 1 closed.
@@ -70,11 +70,11 @@ def palm_beside(place: ArrayLike, radius: float, azimuth: float, gap: float, gro
 
     Args:
         place: (2,) m, x and y of the thing's axis, root frame.
-        radius: of the thing [m].
+        radius: radius of the thing [m].
         azimuth: direction that the palm faces, rad; 0: the left (-y), pi / 2: the front (-x).
         gap: between palm and thing [m].
         ground: height of the surface on which the thing stands [m].
-        grip: numbers of the hand.
+        grip: distances of the palm from the thing and from the ground.
     """
     x, y = np.asarray(place, dtype=np.float64)
     normal = np.array([-np.sin(azimuth), -np.cos(azimuth), 0.0])
@@ -91,7 +91,7 @@ class SideGrasp:
         marker: name of the palm's marker.
         motors: names of the parts and motors that move, without those of the fingers.
         starts: (S, n) rad, postures from which inverse kinematics starts, and near which its results stay.
-        pushing: the robot in the world whose fields push it, if this is another world than that of `model`; None: `model`.
+        pushing: the robot in the world from which the control law's repulsive forces are computed; None: `model`.
     """
 
     def __init__(self, model: Model, marker: str, motors: Sequence[str], starts: ArrayLike, pushing: Model | None = None) -> None:
@@ -127,10 +127,10 @@ class SideGrasp:
         return held
 
     def posture(self, palm: Palm, starts: Array | None = None) -> Array | None:
-        """Return the posture (n,) rad with the given palm pose in which the law pushes least, without contacts of solids.
+        """Return the posture (n,) rad with this pose of the palm in which the control law's forces are smallest and no solids touch.
 
-        `starts`: (S, n) rad, postures from which inverse kinematics starts; None: the `starts` of this object. None is returned if no
-        posture is found.
+        `starts`: (S, n) rad, postures from which inverse kinematics starts; None: the `starts` of this object. The forces are compared by
+        `push`, without spring and damping. None is returned if no posture is found.
         """
         found: list[tuple[float, Array]] = []
         for start in self.starts if starts is None else starts:
@@ -148,20 +148,26 @@ class SideGrasp:
         return min(found, key=lambda one: one[0])[1] if found else None
 
     def push(self, q: Array) -> float:
-        """Return the largest absolute value of `forces` at q (n,) rad, over all motors [rad/s^2]."""
+        """Return the largest absolute value, over all motors, of the control law's forces at q (n,) rad, in rad/s^2.
+
+        They are the forces without spring and damping, as `forces` returns them.
+        """
         return float(np.abs(self.forces(q)).max())
 
     def forces(self, q: Array) -> Array:
-        """Return the control law's forces at q (n,) rad, without spring and damping, (n,) rad/s^2; 0 for motors that do not move.
+        """Return the control law's forces at q (n,) rad, without spring and damping, (n,) rad/s^2.
 
-        The fields of targets do not push the hand of `marker`.
+        They are 0 for motors that the grasp does not move. Targets do not repel the hand of the palm's marker.
         """
         found = np.zeros(len(q))
         found[self._moved] = self._controller.forces(self._pushing.evaluate(q, reaching=self.marker)).total[self._moved]
         return found
 
     def attractor(self, q: Array) -> Array:
-        """Return the attractor (n,) rad whose spring balances the law's other forces at q (n,) rad, so that the robot rests there."""
+        """Return the attractor (n,) rad with which the robot rests at q (n,) rad.
+
+        The spring between the attractor and q cancels the control law's forces there (`forces`).
+        """
         return attractor_for(self.model.robot, self.gains, q, -self.forces(q))
 
     def _closed(self, q: Array, fingers: float, thumb: float) -> Array:

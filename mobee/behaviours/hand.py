@@ -58,9 +58,10 @@ class Hand:
         return found
 
     def closed_around(self, model: Model, q: Array) -> tuple[Array, tuple[str, ...]]:
-        """Return a copy of q (n,) rad with the fingers closed until they touch objects of the model's world, and the objects' names.
+        """Return a copy of q (n,) rad with the fingers closed until they touch objects of the model's world, and these objects' names.
 
-        All fingers close together, beginning open; a motor stops as soon as a solid that it moves touches an object.
+        The computation begins with open fingers and closes all of them together; a motor stops as soon as a solid that it moves touches an
+        object.
         """
         found, moving, touched = self.posture(q, 0.0), np.ones(len(self.motors), dtype=bool), dict[str, None]()
         moves = (self.robot.coupling[0][:, self.motors] != 0.0).T

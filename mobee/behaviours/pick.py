@@ -55,8 +55,9 @@ class Followed:
 def places_near(thing: Array, azimuth: float, shifts: tuple[float, float], count: int, rng: np.random.Generator) -> Array:
     """Return random places (count, 2) m to which a thing at `thing` (2,) m can be moved, root frame.
 
-    Distances from the thing are between the two numbers of `shifts` [m]. The places on the side from which the hand came are first, because
-    the hand met nothing there. `azimuth`: direction that the palm faces, rad; 0: the left (-y), pi / 2: the front (-x).
+    `shifts`: smallest and largest distance of the places from the thing [m]. `count`: number of places. The places on the side from which
+    the hand came are first, because the hand met nothing there. `azimuth`: direction that the palm faced in the grasp, rad; 0: the left
+    (-y), pi / 2: the front (-x). `rng`: draws the places.
     """
     turns, far = rng.uniform(0.0, 2.0 * np.pi, count), rng.uniform(*shifts, count)
     steps = far[:, None] * np.column_stack([np.cos(turns), np.sin(turns)])
@@ -66,7 +67,7 @@ def places_near(thing: Array, azimuth: float, shifts: tuple[float, float], count
 
 
 Forces = Callable[[Array], Array]
-"""A function that takes a posture (n,) rad and returns the law's forces without spring and damping, (n,) rad/s^2."""
+"""A function that takes a posture (n,) rad and returns the control law's forces without spring and damping, (n,) rad/s^2."""
 
 
 class Body(Protocol):
@@ -78,10 +79,12 @@ class Body(Protocol):
         ...
 
     def follow_path(self, path: Array, speed: float, watch: BumpWatch | None = None, forces: Forces | None = None) -> Followed:
-        """Move along a path (K, n) rad and return how the motion ended.
+        """Move along a path, postures (K, n) rad, and return how the motion ended.
 
-        `speed`: share of the largest speed. `watch`: stops the motion at a bump; None: bumps are not detected. `forces`: the law's other
-        forces, which the attractor balances; None: they are not balanced.
+        `speed`: share of the largest speed, above 0 and at most 1. `watch`: detects bumps; at a bump the robot moves back a little and the
+        motion ends; None: bumps are not detected. `forces`: function that takes a posture (n,) rad and returns the forces (n,) rad/s^2 of
+        the control law except spring and damping. The attractor is shifted such that its spring cancels these forces; None: they are not
+        cancelled.
         """
         ...
 
@@ -146,7 +149,8 @@ class PreGrasp:
 def pre_grasps(grasp: SideGrasp, thing: Upright) -> list[PreGrasp]:
     """Return the pre-grasps from which the hand can move to the thing, the best first; those that are reached from above are last.
 
-    The best pre-grasps are those at which the law pushes little until the thing is lifted, because its forces keep the palm from its pose.
+    The best pre-grasps are those in which the control law's repulsive forces are smallest, from the pre-grasp until the thing is lifted,
+    because these forces displace the palm. The list is empty if no pre-grasp is found.
     """
     found: list[tuple[float, PreGrasp]] = []
     for turn in TURNS:
@@ -183,7 +187,7 @@ class Picker:
 
     Args:
         body: the robot.
-        grasp: finds postures; the world of its model contains what must not be touched, without the thing.
+        grasp: finds postures; the world of its model contains the objects that must not be touched, but not the thing to be picked.
         watched: names of the motors whose torques show bumps.
     """
 
@@ -198,7 +202,7 @@ class Picker:
     def settle_at(self, q: Array) -> Array:
         """Move torso and arm to q (n,) rad as exactly as possible; return the attractor (n,) rad that this needs.
 
-        After each settled motion, the remaining error is added to the attractor, at most four times.
+        After each settled motion, the remaining error of the posture is added to the attractor, at most four times.
         """
         aim = self.grasp.attractor(q)
         for number in range(CORRECTIONS + 1):
@@ -211,16 +215,18 @@ class Picker:
         return aim
 
     def move(self, path: Array, speed: float, watch: BumpWatch | None = None) -> bool:
-        """Move along a path (K, n) rad, with an attractor that balances the law's forces; return whether the robot bumped into something.
+        """Move along a path (K, n) rad, with an attractor that cancels the law's forces; return whether the robot bumped into something.
 
-        `speed`: share of the largest speed. `watch`: stops the motion at a bump; None: bumps are not detected.
+        `speed`: share of the largest speed. `watch`: detects bumps; at a bump the robot moves back a little and the motion ends; None:
+        bumps are not detected.
         """
         return self.body.follow_path(path, speed, watch, self.grasp.forces).bumped
 
     def arrive(self, goal: PreGrasp, watch: BumpWatch | None = None) -> bool:
         """Move the hand from its posture away from the thing straight to the pre-grasp; return whether it bumped into something.
 
-        `watch`: stops the motion at a bump; None: bumps are not detected.
+        `goal`: the pre-grasp; the hand first settles at its posture `away`. `watch`: detects bumps; at a bump the robot moves back a little
+        and the motion ends; None: bumps are not detected.
         """
         self.settle_at(goal.away)
         if self.move(np.stack([goal.away, goal.posture]), SLOW, watch):
@@ -267,8 +273,8 @@ class Picker:
     def put(self, thing: Upright, places: Sequence[Array], centre: Array | None = None) -> Array:
         """Put the thing in the hand down at one of the places (2,) m, open the hand and retreat; return the place.
 
-        The first place at which the law pushes little is used, or else the place with the smallest push. If hand or thing bumps into
-        something on the motion down, the hand moves up again and to another place.
+        The first place is used at which the control law's repulsive forces are small, or else the place with the smallest forces. If the
+        hand or the thing bumps into something on the motion down, the hand moves up again and then to another place.
 
         Args:
             thing: the thing as it was seen before the grasp.

@@ -77,7 +77,7 @@ def pre_grasp_map(grasp: SideGrasp, ground: float) -> Roadmap:
 def aside(trm: Roadmap, ground: float, grip: Grip) -> Array:
     """Return the posture (n,) rad of the pre-grasp map `trm` with the hand at the side of the table, where it hides nothing.
 
-    `ground`: height of the surface on which things stand [m]. `grip`: numbers of the hand.
+    `ground`: height of the surface on which things stand [m]. `grip`: its `height` is that of the palm above this surface.
     """
     posture: Array = trm.q[trm.exit(np.array(ASIDE) + np.array([0.0, 0.0, ground + grip.height, 0.0]))]
     return posture
@@ -101,7 +101,8 @@ class Planner(Protocol):
 class MapPlanner:
     """A `Planner` that searches a path without contacts in the pre-grasp map.
 
-    `trm`: the map. `world`: the robot in the world in which paths are checked. `marker`: name of the palm's marker.
+    `trm`: the pre-grasp map, a roadmap as `pre_grasp_map` builds it. `world`: the robot in the world in which paths are checked. `marker`:
+    name of the palm's marker.
     """
 
     def __init__(self, trm: Roadmap, world: Model, marker: str) -> None:
@@ -145,7 +146,8 @@ def near_any(palms: Array, blocked: Array) -> NDArray[np.bool_]:
 def is_around(model: Model, marker: str, path: Array, blocked: Array) -> bool:
     """Return whether the marker stays away from the blocked positions (B, 3) m on a path (K, n) rad.
 
-    The path may begin near a blocked position, but must not return to one after it has left them. A path that never leaves them counts too.
+    A position is near a blocked one as in `near_any`. The path may begin near a blocked position, but once it is away from all of them it
+    must not come near one again. The result is also True for a path that is near blocked positions from its start to its end.
     """
     if not len(blocked):
         return True

@@ -16,7 +16,7 @@ JUMP = 0.05  # m from where the target was expected: it has jumped, and older pl
 
 
 class TargetTrack:
-    """Estimates the motion of a target that moves at a constant velocity, or jumps; times are in s of any clock."""
+    """Estimates the motion of a target that moves at a constant velocity, or jumps; all times are in s of one clock, of any origin."""
 
     def __init__(self, patience: float = 0.6) -> None:
         """Make a track; `patience`: time after the last seen place for which the motion is extrapolated [s]."""
@@ -45,7 +45,7 @@ class TargetTrack:
     def at(self, t: float) -> tuple[Array, Array] | None:
         """Return the position (3,) m and velocity (3,) m/s of the target at time t [s], by a line through the last seen places.
 
-        None if no place is known, or if the last one was seen more than `patience` before t.
+        None if no place is known, or if the last one was seen more than `patience` (0.6 s by default) before t.
         """
         if not self._seen or t - self._seen[-1][0] > self.patience:
             return None

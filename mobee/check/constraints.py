@@ -39,7 +39,11 @@ def constraints(subject: Subject) -> Iterator[Finding]:
 
 
 def row_range(clause: Clause, limits: Array) -> tuple[Array, Array]:
-    """Return the smallest and the largest a.q + b of every row of a clause within the motor limits (n, 2) rad, each (rows,) rad."""
+    """Return the smallest and the largest value a.q + b of every row of a clause, each (rows,) rad.
+
+    A clause is a condition on motor positions q: a.q + b > 0 must hold for at least one of its rows. `limits` (n, 2) rad: the range of each
+    motor.
+    """
     ends = clause.a[:, :, None] * limits[None]
     return ends.min(axis=2).sum(axis=1) + clause.b, ends.max(axis=2).sum(axis=1) + clause.b
 
@@ -134,7 +138,7 @@ MARGIN = 1e-6  # rad
 
 
 def conflict(clauses: Sequence[Clause], limits: Array, poses: Array) -> tuple[int, ...]:
-    """Return the indices of a small set of clauses that contradict each other; () if none is found.
+    """Return the indices of a small set of clauses (conditions on motor positions) that contradict each other; () if none is found.
 
     No pose was found that satisfies all clauses of the set; if any single clause is removed from it, a pose is found. `limits` (n, 2) rad.
     `poses` (k, n) rad: poses within the limits from which the search starts. The search may fail although such a pose exists, but the

@@ -90,9 +90,10 @@ def check_file(
 ) -> Checked:
     """Check a shipped robot or world, or a robot or world file; return its content and all findings, errors first.
 
-    `world`: a world; the objects that the robot touches in it at home are reported too. `field`, `meshes`, `corners`, `srdf`, `home`:
-    options for reading a URDF or MJCF file, as in `mobee.robot.load.load_robot`. Raises RobotFileError, UnknownName or InvalidValue if the
-    file cannot be read, or if an option is not valid for the file.
+    `world`: a world; the objects that the robot touches in it at home are reported too. The other arguments are options for reading a URDF
+    or MJCF file, as in `mobee.robot.load.load_robot`: the width of fields [m], "hull" or "bounding" shapes for meshes, the largest number
+    of corners of a hull, the SRDF file, and the home pose. Raises RobotFileError, UnknownName or InvalidValue if the file cannot be read,
+    or if an option is not valid for the file.
     """
     _require_known(name_or_path)
     path = world_file(name_or_path)

@@ -26,8 +26,8 @@ class Finding:
     """
 
     severity: Severity
-    check: str  # short name of the check
-    where: str  # "file:line"
+    check: str
+    where: str
     what: str
     why: str
     remedy: str

@@ -164,7 +164,8 @@ ROUNDING = 1e-4  # of the motor's range: tolerance for the digits of a file
 def home_zones(subject: Subject) -> Iterator[Finding]:
     """Yield a note on all motors whose home is in a limit zone of the default gains, and a second one on those whose zone ends at home.
 
-    The limit forces push the first ones away from home; the second ones rest at home.
+    In a limit zone, a range before the limit, the control law pushes the motor inward. So it pushes the motors of the first note away from
+    home. The motors of the second note rest at home, because their zone is made narrower and ends there.
     """
     units = motor_units(subject.robot)
     better = {

@@ -82,7 +82,8 @@ Link = tuple[list[Shape], list[Shape]]  # solids, fields
 def fields(subject: Subject) -> Iterator[Finding]:
     """Yield findings about fields inside solids, solids that extend beyond all fields of their link, and links with solids but no field.
 
-    For a robot without any field it is one note.
+    A field is a volume around a solid that causes a repulsive force. For a robot without any field the only finding is a note that says
+    this.
     """
     links: dict[tuple[int, str], Link] = defaultdict(lambda: ([], []))  # two robots may stand on one base
     for shape in subject.robot.shapes:

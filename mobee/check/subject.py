@@ -67,7 +67,7 @@ class Subject:
 
     @cached_property
     def range(self) -> Array:
-        """The lower and upper limit of each motor, (n, 2) rad; an infinite limit is replaced by half a turn."""
+        """The lower and upper limit of each motor, (n, 2) rad; an infinite limit is replaced by -pi or pi."""
         return np.nan_to_num(self.robot.limits, nan=0.0, neginf=-np.pi, posinf=np.pi)
 
     @cached_property
@@ -94,7 +94,7 @@ class Subject:
 
     @cached_property
     def always(self) -> frozenset[Touch]:
-        """The pairs of the robot's shapes that overlap at home and in every sampled pose, as (first name, second name, kind)."""
+        """The pairs of shapes that overlap at home and in every sampled pose, as (first name, second name, "solid" or "field")."""
         model = Model(self.limited)
         left = touches(model.evaluate(self.home).contacts)
         for q in self.samples:
@@ -105,9 +105,10 @@ class Subject:
 
     @cached_property
     def foreign(self) -> tuple[tuple[Shape, Shape, float], ...]:
-        """The fields that overlap a solid of another part at home, but touch no field of that solid's link.
+        """The fields that overlap a solid of another part at home, but touch no field of the link of this solid.
 
-        Each is given as (field, solid, depth [m]). Fields act on fields only, so no force keeps the field's part away from the solid.
+        Each is given as (field, solid, depth [m]). Only two fields that overlap cause a repulsive force, so no force keeps the field's part
+        away from the solid.
         """
         robot, shapes = self.limited, self.robot.shapes
         tested = {frozenset((shapes[i].link, shapes[j].link)) for i, j in robot.solid_pairs}
@@ -150,5 +151,5 @@ class Subject:
 
 
 def touches(contacts: tuple[Contact, ...]) -> set[Touch]:
-    """Return the pairs of volumes of some contacts, as a set of (first name, second name, kind)."""
+    """Return the pairs of volumes of some contacts, as a set of (first name, second name, "solid" or "field")."""
     return {(contact.first, contact.second, contact.kind) for contact in contacts}

@@ -41,21 +41,22 @@ UNKNOWN = "left out by an <ignore> of the file, or by the program that made the 
 class UntestedGroup:
     """All pairs of shapes that are never tested for contacts for the same reason.
 
-    `kind`: the reason without names; groups of the same kind can be added up. `links`: names of the pairs of links. `solids`, `fields`: the
-    numbers of pairs of solids and of fields.
+    `reason`: why they are not tested, with names, for example "adjacent: joint elbow". `kind`: the reason without names, for example
+    "adjacent". `links`: the pairs of links, by name. `solids`, `fields`: the number of pairs of solids, and of pairs of fields (volumes
+    that cause repulsive forces).
     """
 
     reason: str
-    kind: str  # the reason without names: groups of one kind are summed up together
+    kind: str
     links: tuple[tuple[str, str], ...]
-    solids: int  # pairs of solids
-    fields: int  # pairs of fields
+    solids: int
+    fields: int
 
 
 def untested_groups(robot: Robot) -> list[UntestedGroup]:
     """Return the pairs of the robot's shapes that are never tested for contacts, in one group for each reason, the largest group first.
 
-    Solids are never tested against fields of the same robot; such pairs are not listed.
+    Solids are never tested against fields (volumes that cause repulsive forces) of the same robot; such pairs are not listed.
     """
     links: dict[str, set[tuple[int, int]]] = defaultdict(set)
     counts: dict[str, list[int]] = defaultdict(lambda: [0, 0])
@@ -116,9 +117,9 @@ class TouchingPair:
 
     first: str
     second: str
-    reason: Literal["Default", "Always"]  # at home, or in all random poses, as MoveIt names them
-    depth: float  # m, of the deepest contact at home; 0 where they do not touch there
-    share: float  # of the random poses in which they touch
+    reason: Literal["Default", "Always"]
+    depth: float
+    share: float
 
 
 def touching_pairs(robot: Robot, poses: int = POSES) -> tuple[TouchingPair, ...]:
@@ -197,7 +198,8 @@ def _ignoring(subject: Subject, first: str, second: str) -> str:
 def home_contacts(subject: Subject) -> Iterator[Finding]:
     """Yield a finding for each contact of solids or of fields at home, including contacts with the world.
 
-    Pairs that overlap in every sampled pose are left out, since `always_touching` reports them.
+    Fields are volumes that cause repulsive forces. Pairs that overlap in every sampled pose are left out, since `always_touching` reports
+    them.
     """
     world = subject.world.objects if subject.world else {}
     for contact in subject.at_home:
@@ -227,7 +229,7 @@ def home_contacts(subject: Subject) -> Iterator[Finding]:
 
 
 def world_contacts(subject: Subject) -> Iterator[Finding]:
-    """Yield one note with the objects of the world that the robot touches at home; no finding without a world."""
+    """Yield one note with the contacts of the robot's solids and fields with objects of the world at home; no finding without a world."""
     if subject.world is None:
         return
     world = subject.world.objects
@@ -260,7 +262,8 @@ def _parting(subject: Subject, contact: Contact) -> str:
 def foreign_solids(subject: Subject) -> Iterator[Finding]:
     """Yield a note for each pair of parts of which a field of one overlaps a solid of the other at home, but no field of the solid's link.
 
-    Fields act on fields only, so no force keeps the two apart. The note gives the deepest such overlap.
+    Only two fields that overlap cause a repulsive force, so no force keeps the two parts from each other there. The note gives the deepest
+    such overlap.
     """
     deepest: dict[tuple[str, str], tuple[Shape, Shape, float]] = {}
     for field, solid, depth in subject.foreign:
@@ -292,17 +295,18 @@ def _left_out(subject: Subject, one: int, other: int) -> bool:
 class LeftOut:
     """The result of `leave_out_touching`.
 
-    `path`: of the SRDF file. `merged`: whether the file existed before, or the text of another SRDF was copied. `pairs`: the pairs that
-    were added to the file. `enabled`: touching pairs that were not added, because the file enables their test. `touching`: number of
-    contacts of solids that remain at home. `found`: whether `load_robot` finds the file without being given its path.
+    `path`: path of the SRDF file. `merged`: whether the file existed before, or the text of another SRDF was copied. `pairs`: the pairs
+    that were added to the file. `enabled`: the touching pairs that were not added, because the file enables their test. `touching`: number
+    of contacts of solids that remain at home when the robot is read with the new file. `found`: whether `load_robot` finds the file without
+    being given its path.
     """
 
     path: Path
-    merged: bool  # whether the file existed before, or the text of another SRDF was copied
-    pairs: tuple[TouchingPair, ...]  # new in the file
-    enabled: tuple[TouchingPair, ...]  # not written, because the file enables their test
-    touching: int  # contacts of solids at home, of the robot with the new file
-    found: bool  # whether load_robot finds the file by itself
+    merged: bool
+    pairs: tuple[TouchingPair, ...]
+    enabled: tuple[TouchingPair, ...]
+    touching: int
+    found: bool
 
 
 def leave_out_touching(urdf: str | Path, out: Path | None = None, **options: Any) -> LeftOut:

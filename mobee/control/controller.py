@@ -171,7 +171,10 @@ class Controller:
         return total
 
     def set_attractor(self, part: str, q: Array) -> None:
-        """Set the attractor of one part, (n_part,) rad, as a goal that does not move; raises InvalidValue and UnknownName."""
+        """Set the attractor of one part, (n_part,) rad, as a goal that does not move.
+
+        Raises UnknownName for an unknown part, InvalidValue for a wrong shape or numbers that are not finite.
+        """
         where = self.robot.part(part)
         self._attractor[where.slice] = checked(f"attractor of {part}", q, len(where))
         self._state["goal_time"][where.slice] = 0.0
@@ -182,7 +185,7 @@ class Controller:
         The damping of eq. 5.7 then acts on the velocity relative to the goal, C (q' - q*'), so that the part follows without a lag. If
         other forces push a motor against the goal's velocity, the motor follows less; if they are 0.25 rad/s^2 or more, only the spring of
         the attractor pulls the motor. Call this at least every FOLLOW_TIME (0.1 s of the law's time); later the goal counts as not moving.
-        Raises InvalidValue and UnknownName.
+        Raises UnknownName for an unknown part, InvalidValue for a wrong shape or numbers that are not finite.
 
         Args:
             part: name of the part.
@@ -195,9 +198,10 @@ class Controller:
         self._state["goal_velocity"][where.slice], self._state["goal_time"][where.slice] = moving, FOLLOW_TIME
 
     def force(self, f: Array) -> None:
-        """Apply a client's force f to the motors until the next call or `clear` (thesis eq. 5.9); raises InvalidValue.
+        """Apply a client's force f to the motors until the next call or `clear` (thesis eq. 5.9).
 
-        `f`: (n,) rad/s^2, or m/s^2 for a motor that slides.
+        `f`: (n,) rad/s^2, or m/s^2 for a motor that slides. Raises InvalidValue for a wrong shape, and for numbers that are not finite or
+        above LARGEST_FORCE (1e9) in size.
         """
         self._client = checked_force("force", f, len(self.robot.motors))
         self.forced = bool(self._client.any())
@@ -206,7 +210,8 @@ class Controller:
         """Apply a client's force to a marker until the next call for this marker, or `clear` (thesis eq. 5.10).
 
         `f`: force (3,), or force and moment (6,), in the root frame, per unit mass: J^T f is in rad/s^2, and is then bounded. Raises
-        InvalidValue and UnknownName.
+        UnknownName for an unknown marker, and InvalidValue for a wrong shape, or for numbers that are not finite or above LARGEST_FORCE
+        (1e9) in size.
         """
         self.robot.marker(marker)
         self._pushes[marker] = checked_force(f"push on {marker}", f, 6 if len(np.atleast_1d(f)) == 6 else 3)
@@ -220,7 +225,7 @@ class Controller:
         """Pull a marker to a target with the motors of one part, until the next call for this part or `end_reach` (thesis 8.2).
 
         The spring of the attractor and all other forces act at the same time. `part` None: pull with all motors that move the marker.
-        Raises InvalidValue if the marker is moved by none of the motors that may move, and UnknownName.
+        Raises UnknownName for an unknown part or marker, InvalidValue if the marker is moved by none of the motors that may move.
         """
         if self._reaches.marker(part) != marker:
             self._reaches.begin(part, marker)
@@ -268,7 +273,10 @@ class Controller:
         self._state[where] = self.law.at_rest(self._attractor)[where]
 
     def forces(self, pose: Pose) -> Forces:
-        """Return the constraint forces of the law at a pose, as `step` computes them if no forces are given; without user-defined terms."""
+        """Return the constraint forces of the law at a pose, for the present state of the law.
+
+        The forces of user-defined terms are not included; `own_forces` returns them. Raises InvalidValue for a batch of poses.
+        """
         return forces_of(self.law, pose, self.propagate, self._state)
 
     def own_forces(self, q: Array, dt: float, pose: Pose | None = None, reaching: Reaching = None) -> dict[str, Array]:

@@ -33,7 +33,8 @@ class Forces(Mapping[str, Array]):
 
     First are the forces of the law, in the order in which they are added: `limits`, `constraints` and `collision`, which are f_lim, f_cst
     and f_coll of thesis eq. 5.7. Then come the forces of user-defined terms. A force can also be read as an attribute: `forces.limits`.
-    Forces of the law that depend on its state may be missing; such forces exist only in a core that was extended.
+    The forces `limits`, `constraints` and `collision` depend only on the pose. If somebody has extended the compiled core by
+    forces that depend on the state of the law, such as its velocity, such forces may be missing.
     """
 
     __slots__ = ("_rows",)
@@ -80,12 +81,18 @@ class Forces(Mapping[str, Array]):
 
 
 def published_terms() -> tuple[str, ...]:
-    """Return the names of the law's forces that depend on the pose only. The model publishes these; the controller computes all others."""
+    """Return the names of the law's forces that depend on the pose only.
+
+    In the live system the model service computes and publishes these forces, and the controller service computes all others.
+    """
     return tuple(name for name in term_names() if name not in state_term_names())
 
 
 def needs_contacts() -> bool:
-    """Return whether some forces of the law depend on the law's state, such as its velocity. The model then publishes the contacts too."""
+    """Return whether some forces of the law depend on the law's state, such as its velocity.
+
+    In the live system the model service then publishes all contacts too, so that the controller service can compute such forces.
+    """
     return bool(state_term_names())
 
 
@@ -99,10 +106,11 @@ def constraint_forces(pose: Pose, gains: Gains, propagate: Propagate = "tree", c
 
 
 def forces_of(law: Law, pose: Pose, propagate: Propagate, state: Table | None = None) -> Forces:
-    """Return the constraint forces of a law at one pose; raises InvalidValue for a batch of poses, and UnknownName.
+    """Return the constraint forces of a law at one pose.
 
     `propagate`: "tree": a contact acts on all motors down to the base; "part": on the motors of its part only. `state`: the state of the
-    law, with the columns of `mobee._core.law.STATE`; None: at rest.
+    law, with the columns of `mobee._core.law.STATE`; None: at rest. Raises InvalidValue for a batch of poses, and UnknownName for another
+    value of `propagate`.
     """
     if pose.q.ndim != 1:
         raise InvalidValue(f"a batch of poses, of shape {pose.q.shape}: forces belong to one pose")

@@ -28,7 +28,7 @@ Changes = tuple[tuple[str, float], ...]  # (name of a gain, or pattern of motor 
 
 Verdict = Literal["moving", "settled", "timeout"]
 VERDICTS: tuple[Verdict, ...] = ("moving", "settled", "timeout")
-"""The possible results of the settle test, in the order of their numbers in the core."""
+"""The possible results of the settle test, in the order of their numbers in the compiled core."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,11 +41,11 @@ class Settle:
     deg/s are then 0.4 % of its range per second.
     """
 
-    speed: float  # rad/s
-    acceleration: float  # rad/s^2
-    first_check: float = 1.0  # s from the start of the action to the first check
-    interval: float = 0.2  # s between checks
-    timeout: float = 20.0  # s
+    speed: float
+    acceleration: float
+    first_check: float = 1.0
+    interval: float = 0.2
+    timeout: float = 20.0
 
     def __post_init__(self) -> None:
         for name in ("speed", "acceleration", "interval", "timeout"):
@@ -63,6 +63,9 @@ class Gains:
     a fraction of its range (`mobee.robot.motor_units`): a `limit_width` of 10 degrees is 5 % of the range, a force of 12 rad/s^2 is 3.4
     ranges/s^2. Gains can be stored as JSON: write `dataclasses.asdict(gains)`, and make `Gains(**read)` from what was read.
 
+    A clause is a constraint on several joints: a.q + b > 0 must hold for at least one of its rows (`mobee.robot.robot.Clause`). The lever
+    of a contact is the change of its depth if the motors move by 1 rad.
+
     Attributes:
         law: the variant of the law, which decides how constraints and contacts become forces (see `mobee.reference.forces`).
         damping: C in 1/s.
@@ -71,7 +74,8 @@ class Gains:
         max_limit, max_constraint: force at a limit, or at the boundary of a clause, rad/s^2; the force increases further beyond it. In the
             published law `max_constraint` is the largest force.
         limit_width: width of the zone before each limit, rad.
-        constraint_width: width of the zone before the boundary of a clause, rad along the row's normal; published law: in units of a.q + b.
+        constraint_width: width of the zone before the boundary of a clause, in rad along the normal a / |a| of the row; in the published
+            law in units of a.q + b.
         contact_gain: default law: force in rad/s^2 of a contact with a depth of 1 m and a lever of 1 m/rad; published law: a factor of the
             same product, which is squared afterwards; the square is in deg/s^2.
         contact_slope, client_slope: slope at 0 of the function that bounds the force (k of eq. 5.8).
@@ -80,7 +84,7 @@ class Gains:
         weights: pairs (pattern of motor names, 0 or 1). A motor of weight 0 is never moved. The first pattern that matches a motor counts;
             a motor without a match has weight 1.
         motors: pairs (pattern of motor names, gains of these motors), as `with_motors` adds them.
-        groups: such pairs too, with lower priority than `motors`; patterns that match no motor of a robot are ignored.
+        groups: pairs like those of `motors`, with lower priority; patterns that match no motor of a robot are ignored.
     """
 
     law: Law
@@ -127,7 +131,10 @@ class Gains:
 
     @classmethod
     def default(cls) -> Gains:
-        """Return the default gains: the equations of the thesis with our own tuning. Contacts then stay within the fields.
+        """Return the default gains: the equations of the thesis with our own tuning.
+
+        A field is a shape around a link; its contacts cause repulsive forces. These gains keep contacts within the fields, so that the
+        solids inside do not touch.
 
         The time constant C/K is 0.32 s. The experiment `gain-tuning` chose the numbers, with the lag and delay of the motors and commands
         up to three ticks old at 100 Hz. With a stiffer contact the robot begins to oscillate; with stronger springs its links pass through
@@ -156,7 +163,7 @@ class Gains:
     def published_2014(cls) -> Gains:
         """Return the gains of the 2014 program, converted from degrees. They are needed to reproduce the published findings.
 
-        Fingers and eyes do not move. Obstacles enter the fields of the robot model by centimetres.
+        Fingers and eyes do not move. Obstacles enter the fields (shapes around the links that cause repulsive forces) by centimetres.
         """
         return cls(
             law="published_2014",
@@ -181,6 +188,7 @@ class Gains:
     def derived(cls) -> Gains:
         """Return the default gains with a larger bound of the contact force (50 rad/s^2), for robots whose fields `mobee.derive` computed.
 
+        A field is a shape around a link; its contacts cause repulsive forces.
         Such robots have a least lever (`Robot.least_lever`), because of which contacts of all levers have the same stiffness, contact_gain
         * LEVER^2 = 450 1/s^2 (LEVER: 0.5 m). The lever of a contact is the change of its depth if the motors move by 1 rad. The bound of
         the default gains is tuned for the wide fields of the iCub; with it, strong springs would press the fields of such a robot's links
@@ -190,7 +198,7 @@ class Gains:
 
     @classmethod
     def named(cls, name: str) -> Gains:
-        """Return the set of gains with the name "default", "derived" or "published_2014"; raises UnknownName."""
+        """Return the set of gains with the name "default", "derived" or "published_2014"; raises UnknownName for another name."""
         sets = {"default": cls.default, "derived": cls.derived, "published_2014": cls.published_2014}
         if name not in sets:
             raise UnknownName("gain set", name, sets)
@@ -218,7 +226,10 @@ class Gains:
         return _first_match(self._changed(name), motors, common)
 
     def of_robot(self, name: str, robot: Robot) -> Array:
-        """Return the gain `name` of each motor of a robot, (n,), in units of rad, or of m for a motor that slides; raises UnknownName."""
+        """Return the gain `name` of each motor of a robot, (n,), in units of rad, or of m for a motor that slides.
+
+        Raises UnknownName if a pattern that was given to `with_motors` matches no motor of the robot.
+        """
         values = self.of_motors(name, robot.motors)
         if name not in _ANGLES:
             return values

@@ -28,7 +28,7 @@ _OF_MOTORS = ("max_spring", "damping", "client_slope", "max_client")
 
 
 class Law:
-    """The control law of one robot as tables for the core. Several threads may use it. Its methods do not check their arrays."""
+    """The control law of one robot as tables for the compiled core. Several threads may use it. Its methods do not check their arrays."""
 
     def __init__(
         self,
@@ -144,12 +144,12 @@ class ClauseRows:
     `starts` (clauses,): the first row of each clause.
     """
 
-    a: Array  # (rows, n)
-    b: Array  # (rows,) rad
-    normals: Array  # (rows, n), a / |a|
-    norms: Array  # (rows,)
-    clause: NDArray[np.intp]  # (rows,)
-    starts: NDArray[np.intp]  # (clauses,) the first row of each
+    a: Array
+    b: Array
+    normals: Array
+    norms: Array
+    clause: NDArray[np.intp]
+    starts: NDArray[np.intp]
 
 
 def stack_clauses(clauses: Sequence[Clause], n: int) -> ClauseRows:
@@ -176,6 +176,6 @@ class Command:
     The modality of the controller decides which of the three the motors follow.
     """
 
-    position: Array  # rad
-    velocity: Array  # rad/s
-    torque: Array  # N m
+    position: Array
+    velocity: Array
+    torque: Array

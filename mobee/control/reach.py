@@ -29,10 +29,10 @@ class ReachPath:
     rad: what remains at the end between marker and target, and between their normals.
     """
 
-    q: Array  # (steps + 1, n) rad
-    end: Literal["reached", "stuck", "steps used up"]  # why it ended
-    distance: float  # m, of the marker from the target at the end
-    angle: float  # rad, between the normals at the end
+    q: Array
+    end: Literal["reached", "stuck", "steps used up"]
+    distance: float
+    angle: float
 
 
 def reach_path(
@@ -99,9 +99,9 @@ class MarkerError:
     wanted normal.
     """
 
-    position: Array  # (3,) m, of the marker
-    error: Array  # (3,) m toward the target, or (6,) with the rotation of the normal, in which 1 rad counts ARM m
-    angle: float  # rad, between the normals; 0 without a wanted normal
+    position: Array
+    error: Array
+    angle: float
 
     @property
     def distance(self) -> float:

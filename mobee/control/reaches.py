@@ -23,11 +23,11 @@ if TYPE_CHECKING:
 
 
 Chain = tuple[int, Marker, Table, Table, Table]
-"""The arguments of `Reaching`, for one marker and one part: first motor, marker, and the tables of joints, drives and motors."""
+"""The arguments of `Reaching` for one part and one marker: part, marker, joints, drives and motors, as its constructor describes them."""
 
 
 class Reaching:
-    """One reach in progress: a force that pulls a marker to a target. Its state is in the core."""
+    """One reach in progress: a force that pulls a marker to a target. Its state is in the compiled core."""
 
     def __init__(self, part: int, marker: Marker, joints: Table, drives: Table, motors: Table) -> None:
         """Begin a reach without a target.
@@ -75,7 +75,7 @@ class Reaches:
     def begin(self, part: str | None, marker: str) -> None:
         """Begin a reach of a part (None: of the whole body) with a marker. It replaces the part's previous reach and has no target yet.
 
-        Raises InvalidValue if the marker is moved by none of the motors that may move, and UnknownName.
+        Raises UnknownName for an unknown part or marker, InvalidValue if the marker is moved by none of the motors that may move.
         """
         if (part, marker) not in self._chains:
             self._chains[part, marker] = _chain(self._robot, part, marker, self._drawn(part, marker))

@@ -23,6 +23,9 @@ from mobee.robot.robot import Robot
 class ReflexSettings:
     """Settings of the reflex; times in s.
 
+    A violation is a contact, a motor beyond its limit, or a broken constraint on several joints. A waypoint is a recorded pose that counts
+    as safe: the client has marked it, or an earlier recovery has returned control there.
+
     Attributes:
         history: how long poses are recorded.
         confirm: how long a violation must last without a break before it counts.
@@ -66,20 +69,20 @@ TOLERANCE = float(np.deg2rad(1.0))  # rad; the safety gate allows the same beyon
 
 @dataclass(frozen=True, slots=True)
 class Violation:
-    """One contact, limit or clause that a pose violates.
+    """One reason why a pose is not safe: a contact, a motor beyond its limit, or a clause (a constraint on several joints) that is broken.
 
     `kind`: "contact", "limit" or "clause". `what`: the two volumes of a contact ("first - second"), the motor, or the part and number of
-    the clause. `depth`: depth of a contact in m; motion beyond a limit in rad (m of a motor that slides); distance from the nearest row of
-    a clause in rad along its normal.
+    the clause. `depth`: depth of a contact in m; motion beyond a limit in rad (m for a motor that slides); for a clause the distance in rad
+    along the normal of its nearest row, a.q + b > 0, to the boundary of this row.
     """
 
     kind: Literal["contact", "limit", "clause"]
-    what: str  # "first - second", the motor, or the part and number of the clause
-    depth: float  # m of a contact, rad (m of a slide) beyond a limit, rad along the normal of the clause's nearest row
+    what: str
+    depth: float
 
 
 class Watch:
-    """Checks poses for violations: contacts, motors beyond their limits, clauses that do not hold."""
+    """Checks poses for violations: contacts, motors beyond their limits, and clauses (constraints on several joints) that do not hold."""
 
     def __init__(self, robot: Robot, kinds: Sequence[ContactKind] = KINDS, tolerance: float = TOLERANCE) -> None:
         """Prepare the checks for a robot; raises InvalidValue.
@@ -121,18 +124,18 @@ Outcome = Literal["under way", "waypoint", "end of history", "stuck"]
 
 @dataclass(slots=True)
 class Recovery:
-    """One recovery by the reflex, in progress or ended.
+    """One recovery by the reflex, in progress or ended: the robot retraces recent poses after a violation.
 
-    `cause`: the violations at its start. `ticks`: its duration. `deepest`: m, largest depth of a contact during it. `again`: how often a
-    violation was over and came back. `passed`: number of waypoints at which it did not stop, because the pose was in violation. `outcome`:
-    "under way", or why it ended: "waypoint", "end of history" or "stuck".
+    `cause`: the violations at the start. `ticks`: duration in ticks. `deepest`: m, largest depth of a contact during the recovery. `again`:
+    how often a violation was over and came back. `passed`: number of waypoints (poses that count as safe) at which the recovery did not
+    stop, because the pose was in violation. `outcome`: "under way", or why the recovery ended: "waypoint", "end of history" or "stuck".
     """
 
     cause: tuple[Violation, ...]
     ticks: int = 0
-    deepest: float = 0.0  # m, of all contacts since it began
-    again: int = 0  # how often a violation came back
-    passed: int = 0  # waypoints in violation, at which it did not stop
+    deepest: float = 0.0
+    again: int = 0
+    passed: int = 0
     outcome: Outcome = "under way"
 
 
@@ -147,7 +150,7 @@ class Counts:
     reflexes: int = 0
     recovered: int = 0
     stuck: int = 0
-    flips: int = 0  # changes of the unfiltered result of the check
+    flips: int = 0
 
 
 class Debounce:
@@ -174,10 +177,10 @@ class Reflex:
     """A state machine that decides in each tick what commands the robot: the client, or the reflex, which retraces recent poses.
 
     State "forward": the client commands, and poses are recorded; a confirmed violation changes to "brake". State "brake": the robot stops;
-    the time `brake` later, the state changes to "rewind". State "rewind": the target moves back along the recorded poses, to a waypoint or
-    to the oldest pose; then the state changes to "dead". State "dead": the robot waits for the time `dead_time`. Then, if the pose is
-    without violation, the state changes to "forward"; otherwise to "rewind", or to "stuck" if no recorded pose is left. State "stuck" ends
-    when the pose is without violation, or by `accept`.
+    the time `brake` later, the state changes to "rewind". State "rewind": the target moves back along the recorded poses, to a waypoint (a
+    pose that counts as safe, see `mark`) or to the oldest pose; then the state changes to "dead". State "dead": the robot waits for the
+    time `dead_time`. Then, if the pose is without violation, the state changes to "forward"; otherwise to "rewind", or to "stuck" if no
+    recorded pose is left. State "stuck" ends when the pose is without violation, or by `accept`.
     """
 
     def __init__(self, settings: ReflexSettings, dt: float, max_velocity: Array) -> None:

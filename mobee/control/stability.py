@@ -23,10 +23,10 @@ class Bound:
     `step`: s. `motor`: the motor with the largest share of that motion. `damping` 1/s and `stiffness` 1/s^2: of the law along that motion.
     """
 
-    step: float  # s
-    motor: str  # the motor that moves most in that motion
-    damping: float  # 1/s, along that motion
-    stiffness: float  # 1/s^2
+    step: float
+    motor: str
+    damping: float
+    stiffness: float
 
 
 def largest_step(robot: Robot, gains: Gains) -> float:

@@ -30,10 +30,10 @@ class Chain:
 def chains(robot: Robot) -> list[Chain]:
     """Return the chains of joints that can be arms or legs, in the order of the tree.
 
-    A chain ends at a link without further joints, or at a hand. At a branching, a branch is short if it is shorter than HAND (0.5) times
-    the chain. If all branches are short, they are the fingers of a hand, and the chain ends there. Short branches beside longer ones are
-    ignored. If one branch is long, the chain continues in it (unless the chain has only one joint). Else each long branch begins a new
-    chain, and the joints before the branching are a trunk, which belongs to no chain.
+    A chain ends at a link without further joints, or at a hand. At a branching, a branch is short if it is shorter [m] than HAND (0.5)
+    times the chain up to there. If all branches are short, they are the fingers of a hand, and the chain ends there. Short branches beside
+    longer ones are ignored. If one branch is long, the chain continues in it (unless the chain has only one joint). Otherwise each long
+    branch begins a new chain, and the joints before the branching are a trunk, which belongs to no chain.
     """
     tree = _Tree(robot)
     found: list[Chain] = []

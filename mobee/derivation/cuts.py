@@ -44,11 +44,12 @@ class _Group:
 
 
 def with_cuts(robot: Robot, pairs: Ints, seed: int) -> tuple[Robot, tuple[str, ...], Ints]:
-    """Add limits and clauses that keep pairs of solids apart.
+    """Add motor limits, and clauses (conditions on several motor positions), that keep pairs of solids from touching.
 
-    Return the robot with them, the names of the motors whose range is narrower now, and the pairs (r, 2) that can still touch in more than
-    MOST_LEFT (20 %) of the sampled touching positions: fields are needed for these. `pairs` (p, 2): indices of shapes; pairs with more than
-    MOST_MOTORS (3) motors between them, or with motors of several parts, are not treated and not returned. `seed`: of the samples.
+    Returns the robot with them, the names of the motors whose range is narrower now, and the pairs (r, 2) for which this fails, so that
+    they need fields (volumes that cause repulsive forces): more than MOST_LEFT (20 %) of the sampled positions in which they touch are
+    still allowed. `pairs` (p, 2): indices of shapes. Pairs with more than MOST_MOTORS (3) motors between them, or with motors of several
+    parts between them, are left as they are and not returned. `seed`: seed of the samples.
     """
     narrowed: dict[int, Array] = {}
     clauses: list[Clause] = []

@@ -29,8 +29,9 @@ LEFT_OUT = "solids that touch in most poses, or in every home that was tried"
 class Arm:
     """An arm that learns.
 
-    `part`: name of its part. `motors`: names of the motors of its chain. `joints`: names of the motors to learn, which span its states.
-    `movement`: m, how far the best motor moves the end of the arm over its range; 0 if the arm was requested, not found.
+    `part`: name of its part. `motors`: names of the motors of its chain. `joints`: names of the motors that are learned; the states of the
+    arm are a lattice of their positions. `movement`: m, how far the best motor moves the end of the arm over its range; 0 for an arm that
+    the caller of `derive` requested.
     """
 
     part: str
@@ -43,11 +44,12 @@ class Arm:
 class Derived:
     """A robot that curious agents can use at once, and the derived values.
 
-    `arms`: those that learn. `limited`: names of motors that had a range of a turn or more and got half a turn to each side. `home_moved`:
-    names of motors whose home was moved, so that no solids touch at home and fields are apart. `narrowed`: names of motors with a narrower
-    range, because beyond it solids touch that fields cannot keep apart; clauses that were added do the same for combinations of several
-    motors. `left_out`: names of the pairs of links that are no longer tested for contacts. `field`: width of the fields that were added
-    [m], 0: none. `gains`: of the control law: `Gains.derived()`, or the default ones for a robot that has its own fields.
+    `arms`: the arms that learn. `limited`: names of motors that had a range of a turn or more and got half a turn to each side.
+    `home_moved`: names of motors whose home was moved, so that no solids touch at home and fields (volumes that cause repulsive forces) do
+    not overlap. `narrowed`: names of motors with a narrower range, because beyond it solids touch that fields cannot keep apart; clauses,
+    conditions that were added to the robot, do the same for combinations of several motors. `left_out`: names of the pairs of links that
+    are no longer tested for contacts. `field`: width of the fields that were added [m], 0: none. `gains`: gains of the control law:
+    `Gains.derived()`, or the default ones for a robot that has its own fields.
     """
 
     robot: Robot
@@ -76,13 +78,14 @@ class Derived:
 def derive(robot: Robot, parts: Mapping[str, Sequence[str]] | None = None, seed: int = 0) -> Derived:
     """Derive arms, joints to learn, limits, home, tested pairs and fields of a robot.
 
-    A robot with more than one part keeps its parts; a robot that has fields keeps its fields, its tested pairs and its home.
+    The fields are volumes around the solids that cause repulsive forces. A robot with more than one part keeps its parts; a robot that has
+    fields keeps its fields, its tested pairs and its home.
 
     Args:
         robot: any robot.
-        parts: name of each part that should learn -> the names of its motors to learn; None: they are derived. A part that the robot
-            does not have is made of these motors.
-        seed: of the random poses in which contacts and movements are measured.
+        parts: name of each part that should learn -> the names of its motors to learn; None: they are derived. A part that the robot does
+            not have is made of these motors.
+        seed: seed of the random poses in which contacts and movements are measured.
 
     Raises:
         InvalidValue: no motor moves the end of a chain, or a part in `parts` is given no motors, or motors of another part.

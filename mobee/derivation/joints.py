@@ -40,9 +40,10 @@ def bounded(robot: Robot) -> tuple[Robot, list[str]]:
 
 
 def with_limits(robot: Robot, limits: Mapping[int, Array]) -> Robot:
-    """Return a copy of the robot with new limits of some motors; home and the limits of the joints are adapted.
+    """Return a copy of the robot with new limits of some motors.
 
-    `limits`: index of the motor -> (2,) in the unit of the motor, rad or m.
+    The home position of each of these motors is clipped to its new limits, and the limits of the joints that it drives are computed again
+    from them. `limits`: dict from the index of a motor to its lowest and highest position (2,), in the unit of the motor, rad or m.
     """
     table = [
         replace(motor, limits=limits[k], home=float(np.clip(motor.home, *limits[k]))) if k in limits else motor
@@ -61,7 +62,7 @@ def _with_motors(robot: Robot, table: Sequence[Motor]) -> Robot:
 def movements(robot: Robot, chain: Chain, motors: Sequence[int], seed: int) -> Array:
     """Return how far each motor moves the end of a chain over the motor's range, (k,) m: the mean over random poses of the other motors.
 
-    `motors`: their k indices. `seed`: of the random poses.
+    `motors`: indices of the k motors. `seed`: seed of the random poses.
     """
     low, high = robot.limits.T
     point = end_point(robot, chain)
@@ -80,7 +81,8 @@ def movements(robot: Robot, chain: Chain, motors: Sequence[int], seed: int) -> A
 def joints_to_learn(robot: Robot, motors: Sequence[int], moved: Array) -> tuple[str, ...]:
     """Return the names of the motors that move the end of an arm most, at most MOST_JOINTS (4), in the given order.
 
-    `motors`: their k indices. `moved`: (k,) m, how far each motor moves the end; motors below 10 % of the largest value are left out.
+    `motors`: indices of the k motors. `moved`: (k,) m, how far each motor moves the end; motors below 10 % of the largest value are left
+    out.
     """
     best = [k for k in np.argsort(-moved, kind="stable")[:MOST_JOINTS] if moved[k] >= LEAST_SHARE * moved.max()]
     return tuple(robot.motors[motors[k]] for k in sorted(best))

@@ -91,9 +91,9 @@ def _lever_of(pose: Pose, row: int) -> float:
 
 
 def can_cut(robot: Robot, links: LinkPair) -> bool:
-    """Return whether one to MOST_MOTORS (3) motors, all of one part, move two links against each other.
+    """Return whether the motors that move two links against each other are one to MOST_MOTORS (3) motors of one part.
 
-    Only then limits and clauses can keep the two links apart.
+    Only then motor limits, and clauses (conditions on motor positions), can keep the two links apart.
     """
     motors = motors_between(robot, [links])
     return 0 < len(motors) <= MOST_MOTORS and len({robot.motor_table[k].part for k in motors.tolist()}) == 1
@@ -103,7 +103,7 @@ def free_home(robot: Robot, seed: int) -> tuple[Array, set[LinkPair]]:
     """Return a home (n,) near the robot's home in which as few solids as possible touch, and the pairs of links that still touch.
 
     Positions are in the units of the motors, rad or m. Only the motors between links that touch are moved: to random positions, in a range
-    about the best position so far that grows in each round of the search. `seed`: of these positions.
+    about the best position so far that grows in each round of the search. `seed`: seed of the random positions.
     """
     solids = replace(robot, field_pairs=robot.field_pairs[:0])
     model, rng = Model(solids), np.random.default_rng(seed)
@@ -151,20 +151,21 @@ def motors_between(robot: Robot, pairs: Collection[LinkPair]) -> Ints:
 
 
 def field_width(reach: float) -> float:
-    """Return the width of the fields of a robot [m], the distance by which they extend beyond the solids.
+    """Return the width [m] of the fields to be added to a robot, the distance by which they extend beyond the solids.
 
-    It is 6 % of `reach`, the length [m] of the robot's longest arm, and at least 5 mm and at most 6 cm.
+    A field is a volume around a solid that causes a repulsive force. The width is 6 % of `reach`, the length [m] of the robot's longest
+    arm, and at least 5 mm and at most 6 cm.
     """
     return float(np.clip(FIELD_SHARE * reach, NARROWEST, WIDEST))
 
 
 def with_fields(robot: Robot, pairs: Ints, width: float, seed: int, short: float = SHORT) -> tuple[Robot, Ints]:
-    """Add fields around pairs of solids; return the robot with them, and the pairs (r, 2) of solids that get no fields.
+    """Add fields (volumes that cause repulsive forces) around solids; return the robot, and the pairs (r, 2) of solids that get none.
 
-    `pairs`: (p, 2) indices of shapes. `width`: m, distance by which fields extend beyond the solids. Fields of 1/2, 1/4 and 1/8 of the
-    width are tried for pairs whose fields overlap at home, or in more than FIELD_OFTEN (60 %) of random poses. They are also tried for
-    pairs that limits and clauses could keep apart and whose contacts have levers shorter than `short` times the robot's least lever.
-    `seed`: of the random poses.
+    `pairs`: (p, 2) indices of shapes, the pairs of solids that fields should keep apart. `width`: m, distance by which fields extend beyond
+    the solids. A pair gets fields of the full width, or else of 1/2, 1/4 or 1/8 of it. A width is not used for a pair whose fields would
+    overlap at home or in more than FIELD_OFTEN (60 %) of random poses. It is also not used if limits and clauses can keep the pair apart,
+    and its contacts have levers shorter than `short` times the robot's least lever. `seed`: seed of the random poses.
     """
     for suffix, size in SIZES.items():
         robot, pairs = _with_fields(robot, pairs, size * width, suffix, seed, short)
@@ -172,9 +173,10 @@ def with_fields(robot: Robot, pairs: Ints, width: float, seed: int, short: float
 
 
 def home_apart(robot: Robot, reach: float, seed: int) -> Array:
-    """Return a home (n,) near the robot's home in which fields of half the usual width do not overlap, as far as one is found.
+    """Return a home (n,) near the robot's home in which no solids touch and fields of half the usual width do not overlap.
 
-    Positions are in the units of the motors, rad or m. `reach`: m, length of the robot's longest arm. `seed`: of the random search.
+    Fields are volumes that cause repulsive forces. If no such home is found, it is the one with the fewest contacts that was found.
+    Positions are in the units of the motors, rad or m. `reach`: m, length of the robot's longest arm. `seed`: seed of the random search.
     """
     width = AT_HOME * field_width(reach)
     needed = sorted(set(robot.solid_pairs.ravel().tolist()))

@@ -145,7 +145,8 @@ class ReachEnv(Env[Any, Any]):
     """A Gymnasium environment: reach positions with a hand, while the controller of MoBeE prevents collisions.
 
     An action (d,) in [-1, 1] moves the attractor of each of the d joints by up to `step` rad, within the joint's limits; then `period`
-    seconds are simulated. Contacts of fields, joint limits and cable constraints cause forces during every step.
+    seconds are simulated. Contacts of fields, joint limits and cable constraints cause forces during every step. A field is a shape around
+    a link; it is not solid, but its contacts cause repulsive forces.
 
     The observation is a dict: `observation` (3 d,): positions of the joints by the encoders [rad], their attractors [rad], and the
     controller's own velocities [rad/s]; `achieved_goal` (3,): position of the marker, and `desired_goal` (3,): its goal, both in m in the
@@ -153,8 +154,8 @@ class ReachEnv(Env[Any, Any]):
     an environment that was made by its id truncates it after 50 steps.
 
     `info["is_success"]`: whether the marker is at the goal now. `info["solid_depth"]` and `info["field_depth"]`: m, the deepest contact of
-    solids and of fields during the step, 0 without a contact. Solids are tested against the world; within the robot, only pairs of links
-    whose fields are tested too.
+    solids and of fields during the step, 0 without a contact. Contacts of the robot's solids with the world always count; contacts between
+    solids of two links count only if the fields of these links are tested for contacts too.
 
     `reset` puts the robot at home and draws a goal, or takes `options={"goal": (x, y, z)}`, m, root frame.
 

@@ -83,7 +83,7 @@ class CuriousAgent(CuriousLearner):
         return self._state
 
     def decide(self, state: int) -> int:
-        """Choose the action to take in a state, and remember it for `target`, `act` and `observe`."""
+        """Choose the action to take in a state, and return its number; `target`, `act` and `observe` then refer to this action."""
         action = self._choose(state)
         self._pending = state, action
         return action
@@ -155,7 +155,11 @@ class CuriousAgent(CuriousLearner):
         return self.act()
 
     def act(self) -> float:
-        """Perform the action that was decided last, and learn from its outcome; return the reward in nats. Raises as `step` does."""
+        """Perform the action that `decide` chose last, and learn from its outcome; return the reward, the information gain, in nats.
+
+        Raises ActionInterrupted if the plant does: then nothing is learned or stored, and the next read of `state` measures the state
+        again. Raises MobeeError if no action was decided.
+        """
         try:
             outcome = self.plant.act(self.part, self.target(self._decided()[1]))
         except ActionInterrupted:

@@ -14,7 +14,10 @@ PREDICTABLE_SHARE = 0.8
 
 
 def probability_of(beliefs: OutcomeModel, s: int, a: int, outcome: int) -> float:
-    """Return the believed probability that action `a` in state `s` ends in the state `outcome`; 0 for one that was never observed."""
+    """Return the probability, in the model `beliefs`, that action `a` in state `s` ends in the state `outcome`.
+
+    It is 0 for a state that the model does not list as an outcome of the action.
+    """
     return float(beliefs.probabilities[s, a][beliefs.outcomes[s, a] == outcome].sum())
 
 

@@ -21,8 +21,9 @@ class DiscreteSpace(Space):
     """Numbered states, each with the same numbered actions, of a decision problem without a robot.
 
     It is the Space of a robot with two motors, whose positions are the number of the state and of the action. So agents and plants of this
-    library work with it. A model imagines that an action leads to its goal before the first try. Here the result of an action is not known
-    in advance, so the goal is the state itself. Plan with `beliefs="debiased"`, on which this goal has little influence.
+    library work with it. Before the first try of an action, a transition model contains an imagined outcome in which the action reaches its
+    goal. Without `goals` the result of an action is not known in advance, so the goal is the state itself. Let the agent plan with
+    `beliefs="debiased"`, on which this goal has little influence.
 
     Args:
         states: number of states, at least 2.

@@ -34,8 +34,9 @@ class Explorable(Protocol):
     transitions: int
 
     def plan(self, reward: Array | None = None, beliefs: OutcomeModel | None = None, key: str = "curious") -> tuple[Array, Array]:
-        """Compute the values of states (S,) and of actions (S, A) for a reward (S, A) and beliefs (None: the agent's own).
+        """Compute the values of states (S,) and of actions (S, A) in a plan with the agent's discount.
 
+        `reward`: (S, A); None: the information gain, or the reward of the agent's goal. `beliefs`: outcome model; None: that of the agent.
         `key`: name of the plan; each plan starts from the values of the previous plan with the same name.
         """
 
@@ -98,13 +99,14 @@ HORIZONS = 2.0  # length of the simulated plan, in units of 1 / (1 - discount)
 
 
 def depleting(agent: Explorable, state: int, rng: np.random.Generator) -> Array:
-    """Score actions by the discounted sum of expected information gains; among equal actions, by the gain that remains after the plan.
+    """Score actions by the discounted sum of expected information gains; among equal actions, by the gains that remain afterwards.
 
-    The explorer `curious` plans with the last gain of each state-action. Here the reward is the expected gain of the next observation, with
-    the outcome probabilities of `TransitionModel.debiased`. It decreases sooner if an action is certain; for an action that was never tried
-    it is the imagined gain. Then the best plan is simulated through its most probable outcomes, and the gains along it decrease
-    accordingly. A second plan computes the value of the remaining gains: a state with one untried action is then worth less than a state
-    with sixteen. Both plans use the agent's beliefs.
+    The explorer `curious` plans with the gain of the last observation of each state-action. This explorer plans with the expected gain of
+    the next observation, under the outcome probabilities of `TransitionModel.debiased`; it decreases sooner if the outcome of an action is
+    certain. For an action that was never tried it is the gain of an imagined success. If several actions have equal scores, the best plan
+    is simulated through its most probable outcomes, and the gains of the actions in it are reduced as if these were observed. A second plan
+    computes the value of the remaining gains, which decides: a state with one untried action is worth less than a state with sixteen. Both
+    plans use the agent's beliefs. Raises InvalidValue if the agent's divergence is neither "kail" nor "kl".
     """
     model, actions = agent.model, len(agent.model.space.actions(state))
     if model.divergence not in DIVERGENCES:
@@ -194,8 +196,8 @@ def choose(scores: Array, rng: np.random.Generator) -> int:
 class Draws:
     """Random generators for numbered decisions: the random numbers depend only on a seed, a name and a number.
 
-    It uses one generator, whose state is set for each number; this takes a tenth of the time of making a generator. `name`: distinguishes
-    users with the same seed.
+    It uses one generator, whose state is set for each number; this takes a tenth of the time of making a generator. `name`: two objects
+    with different names give different random numbers for the same seed.
     """
 
     def __init__(self, name: str) -> None:
@@ -206,7 +208,10 @@ class Draws:
         return Draws, (self._name,)
 
     def at(self, seed: int, count: int) -> np.random.Generator:
-        """Return the generator for a seed and number `count`, before its first random number; it is valid until the next call."""
+        """Return the generator for a seed and the number `count` of a decision; it is valid until the next call.
+
+        It is always the same object, in the state before its first random number.
+        """
         self._generator.pending = f"{self._name} {seed} {count}"
         return self._generator
 

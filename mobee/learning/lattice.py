@@ -134,9 +134,10 @@ BLOCK_GAP = 0.8  # between the blocks of a drawn lattice, in steps of its first 
 def plane_layout(space: Space) -> Array:
     """Compute positions in a plane at which to draw the states, shape (S, 2).
 
-    A lattice becomes a grid of grids, as in the paper's figure 7: within a block the first joint increases to the right and the second
-    upwards; the third and fourth joint choose the block, and so on. For an `ObjectSpace` each cell of the object has a block with all
-    postures. Other spaces are projected to the two directions in which the samples differ most.
+    A lattice becomes a grid of blocks, as in figure 7 of the article in Frontiers in Neurorobotics 7:25 (2014): within a block the first
+    joint increases to the right and the second upwards; the third joint chooses the column of the block, the fourth its row, and so on. For
+    an `ObjectSpace` each cell of the object has a block with all postures. Other spaces are projected to the two directions in which the
+    samples differ most.
     """
     if isinstance(space, Lattice):
         return _nested([len(levels) for levels in space.levels])

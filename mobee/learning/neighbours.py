@@ -108,20 +108,21 @@ Edges = list[tuple[int, int]]  # state, goal
 
 
 def edges_of(goals: Ints) -> Edges:
-    """Return all edges (state, goal) of a table of goals (S, A), state by state."""
+    """Return a list of all edges of a table of goals (S, A), state by state: a pair (state, goal) for each action that exists."""
     states, actions = np.nonzero(goals != NO_ACTION)
     return list(zip(states.tolist(), goals[states, actions].tolist(), strict=True))
 
 
 def joined(edges: Edges) -> Edges:
-    """Return the edges (state, goal) without repetitions, in ascending order."""
+    """Return the edges, a list of pairs (state, goal), without repetitions and in ascending order."""
     return sorted(set(edges))
 
 
 def table_of(edges: Edges, states: int) -> Ints:
-    """Return the table of goals (S, A) of edges (state, goal), which must be in ascending order.
+    """Return the goals of each state as a table (S, A): the inverse of `edges_of`.
 
-    `states`: number of states S. Rows of states with fewer than A actions end in NO_ACTION (-1).
+    `edges`: pairs (state, goal) in ascending order. `states`: number of states S. Rows of states with fewer than A actions end in NO_ACTION
+    (-1).
     """
     counts = np.bincount([state for state, _ in edges], minlength=states)
     goals: Ints = np.full((states, max(1, int(counts.max(initial=0)))), NO_ACTION, dtype=np.intp)

@@ -26,10 +26,10 @@ def steps_between(space: Space, start: int, targets: Ints) -> int:
 
 
 def shortest_actions(space: Space, beliefs: OutcomeModel, start: int, targets: Ints) -> dict[tuple[int, int], float]:
-    """Return the actions on the shortest paths from `start` to the nearest of `targets` if every action reached its goal.
+    """Return the actions that lie on a shortest path from `start` to the nearest of `targets`, and their probabilities of success.
 
-    A dict from (state, goal state) to the probability, according to `beliefs`, that the action ends in its goal state; empty without a
-    path.
+    The paths assume that every action reaches its goal. The result is a dict from (state, goal state) of an action to the probability,
+    according to `beliefs`, that the action ends in its goal state. It is empty if there is no path.
     """
     graph = _graph(space)
     there, on = _steps(graph, np.array([start])), _steps(graph.T.tocsr(), targets)
@@ -43,10 +43,11 @@ def shortest_actions(space: Space, beliefs: OutcomeModel, start: int, targets: I
 
 
 def passing(actions: dict[tuple[int, int], float]) -> dict[int, float]:
-    """Return for each state the probability of passing it: the highest of an action into it times the highest of an action out of it.
+    """Return a dict from each state to the probability of passing it, that is, of entering and leaving it by the most reliable actions.
 
-    `actions`: a dict from (state, goal state) of an action to its probability of success. States without an action into them, or out of
-    them, are not in the result.
+    `actions`: a dict from (state, goal state) of an action to its probability of success. The result for a state is the highest probability
+    of the actions that lead to it, times the highest probability of the actions that start in it. States that lack either kind of action
+    are left out.
     """
     entry: dict[int, float] = {}
     leaving: dict[int, float] = {}

@@ -70,7 +70,8 @@ def model_from(space: Space, settings: Mapping[str, Any]) -> TransitionModel:
 class Learned:
     """The space and the transition model of an agent, rebuilt from its transitions.
 
-    `part`: name of the agent, which is that of its part. `transitions`: their number. `state`: the state in which the last one ended.
+    `part`: name of the agent, which is the name of its part. `transitions`: number of transitions. `state`: the state in which the last
+    transition ended.
     """
 
     part: str

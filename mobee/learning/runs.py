@@ -22,11 +22,11 @@ NEGLIGIBLE = 1e-3  # probability below which a run is dropped
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Runs:
-    """The possible present runs of an action, the longest first. A run is the time since its outcomes changed.
+    """The R hypotheses about the present run of an action, the longest run first. A run is the time since the action's outcomes changed.
 
-    `weight`: (R, H) probability of each of R runs, given each of H hazards. `counts`: (R, B) number of each outcome since the run began.
-    `suspected`: the increase of the probability that a neighbour has changed, because of which this action became suspect; 0 if the action
-    was tried since.
+    `weight`: (R, H) probability of each run, given each of the H hazards (the probability of a change before a try) in HAZARDS. `counts`:
+    (R, B) number of each of the B outcomes since the run began. `suspected`: 0, or, if this action may have changed because a neighbouring
+    action did, the increase of the probability that the neighbour has changed; it is 0 again after the next try of this action.
     """
 
     weight: Array
@@ -35,11 +35,12 @@ class Runs:
 
 
 class OutcomeRuns:
-    """The runs of all actions of a space: how often each outcome was observed since the outcomes of the action changed.
+    """Counts, for each action of a space, how often each outcome was observed since the outcomes of the action changed.
 
-    If the outcomes of an action have changed, the outcomes of its neighbours may have changed too. Neighbours are the actions to the same
-    goal, and the action from this goal back to the state. The share of neighbours for which this is true is learned. If the probability
-    that an action has changed increases by p, the runs of its neighbours end with the probability p times this share.
+    The time since this change is the run of the action; it is not known, so each possible run has a probability. If the outcomes of an
+    action have changed, the outcomes of its neighbours may have changed too. Neighbours are the actions to the same goal, and the action
+    from this goal back to the state. The share of neighbours that change together with an action is learned. If the probability that an
+    action has changed increases by p, the runs of its neighbours end with the probability p times this share.
 
     Args:
         space: states and actions.
@@ -57,7 +58,10 @@ class OutcomeRuns:
         return self._expected(runs, self._hazard)
 
     def following(self, state: int, action: int, chosen: int, bins: int) -> Array:
-        """Return what `counts` would return after one more outcome, of index `chosen`; nothing is changed."""
+        """Return the expected numbers, as `counts` returns them, after one more outcome with the index `chosen`, (bins,).
+
+        Nothing is changed. `bins`: number of outcomes of the action.
+        """
         runs, evidence = self._after(self._of(state, action, bins), chosen)
         return self._expected(runs, self._informed(evidence))
 

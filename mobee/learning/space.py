@@ -195,7 +195,8 @@ def checked_joints(robot: Robot, joints: Sequence[str]) -> tuple[Part, Ints]:
 def checked_neighbours(neighbours: object, states: int, also: str = "") -> int:
     """Return the number of neighbours of each state: the given one; for None 16, or all other states if there are fewer.
 
-    `states`: number of states. `also`: text about further valid values, for the message. Raises InvalidValue.
+    `states`: number of states. `also`: text about further valid values, for the error message. Raises InvalidValue unless `neighbours` is
+    None or a whole number from 1 to `states` - 1.
     """
     if neighbours is None:
         return min(NEIGHBOURS, states - 1)

@@ -67,9 +67,10 @@ def with_shortcuts(space: Space, transitions: Sequence[Transition], count: int, 
 
 
 def carried(transitions: Sequence[Transition], old: Space, new: Space) -> list[Transition]:
-    """Return those transitions of the space `old` that exist in the space `new`, over the same joints, with new numbers from 1.
+    """Convert transitions of the space `old` to the space `new`, which must have the same joints; return the converted transitions.
 
-    Start and goal states are matched by their samples. The outcome is the state of `new` that contains the recorded pose.
+    A transition is left out if `new` has no action between states with the same samples as its start and its goal. Its end state becomes
+    the state of `new` that contains the recorded pose. The transitions are numbered again from 1.
     """
     same = {state: new.state_of_joints(sample) for state, sample in enumerate(old.samples)}
     same = {before: now for before, now in same.items() if np.array_equal(old.samples[before], new.samples[now])}

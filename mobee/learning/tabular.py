@@ -184,8 +184,8 @@ def half_space(
     """Return outcomes and probabilities, each (S, A, B), of a world in which a plane cuts off extreme states, as the robot's cables do.
 
     An action ends at the projection of its goal onto the free side of the plane, shifted towards its start, plus normal noise. With the
-    default plane and the arm's four joints in the published order, it cuts off the states with low pitch, high roll and high yaw: 24, 51
-    and 78 of the 81 states.
+    default plane and three levels of each of the arm's four joints, in the order pitch, roll, yaw, elbow, the plane cuts off the states
+    with low pitch, high roll and high yaw: these are the states number 24, 51 and 78 of the 81 states.
 
     Args:
         space: a lattice.

@@ -28,7 +28,7 @@ def kl_divergence(p: ArrayLike, t: ArrayLike) -> float:
     """Return the Kullback-Leibler divergence KL(P || T) in nats of two distributions over the same outcomes (thesis eq. 6.5).
 
     `p`, `t`: counts or probabilities, shape (bins,), all above 0 (otherwise it is undefined, thesis 6.4.2); they are normalised here.
-    Raises InvalidValue.
+    Raises InvalidValue if the shapes differ, or a number is not finite or not above 0.
     """
     new, old = np.asarray(p, dtype=np.float64), np.asarray(t, dtype=np.float64)
     if new.ndim != 1 or new.shape != old.shape or not len(new):
@@ -142,7 +142,7 @@ Both distributions: shape (bins,), all above 0, of sum 1.
 DIVERGENCES: dict[str, Divergence] = {"kail": kl_divergence, "kl": kl_divergence}
 """By name, the divergences of the library: "kail" is over the observed outcomes of a state-action, "kl" over all states.
 
-The core computes both in closed form.
+The compiled core computes both in closed form.
 """
 
 
@@ -276,7 +276,7 @@ class TransitionModel(Tabled):
         """Return outcome probabilities for plans: from the real counts and a weak prior. Later observations of this model update them.
 
         `goal`, `stay`: imagined counts of success (above 0) and of failure (at least 0), in place of the imagined counts of Algorithm 8.
-        For the same numbers the same object is returned. Raises InvalidValue.
+        For the same numbers the same object is returned. Raises InvalidValue for a number out of its range.
         """
         if not (0.0 < goal < np.inf and 0.0 <= stay < np.inf):
             raise InvalidValue(f"goal={goal!r}, stay={stay!r}: give counts, the first above 0 and the second at least 0.")

@@ -39,7 +39,7 @@ class OutcomeModel(Protocol):
 
 
 class Tabled(ABC):
-    """Base of an `OutcomeModel` that caches a table of its outcomes and probabilities in the form that the core reads.
+    """Base of an `OutcomeModel` that caches a table of its outcomes and probabilities in the form that the compiled core reads.
 
     A subclass sets `_table` to None when it replaces its arrays; the table is then built again. A copy of an object builds its own table.
     """
@@ -48,7 +48,7 @@ class Tabled(ABC):
 
     @property
     def table(self) -> TransitionTable:
-        """Outcomes and probabilities as a table for the core."""
+        """Outcomes and probabilities in the form that the compiled core reads; it is built when it is read first."""
         if self._table is None:
             self._table = self._tabled()
         return self._table
@@ -76,7 +76,7 @@ def value_iteration(
         model: the outcomes of the actions; a state without actions keeps its starting value.
         reward: (S, A) reward of each action; -inf excludes an action; entries without an action are ignored.
         discount: factor of future rewards, in [0, 1).
-        tolerance: above 0; the values are within tolerance * discount / (1 - discount) of the limit.
+        tolerance: above 0; the values are within tolerance * discount / (1 - discount) of the exact values.
         start: (S,) values with which the first sweep begins; None: 0.
         relative: True: the tolerance is in units of the largest |reward| of an action (of 1 if all are 0); False: in units of the reward.
         method: "jacobi": Algorithm 7: every sweep updates all actions, until no action value changes; "modified": modified policy
@@ -119,7 +119,9 @@ def value_iteration(
 
 
 def tables(model: OutcomeModel, reward: Array, discount: float) -> tuple[Array, Ints, Array]:
-    """Return probabilities (S, A, B), outcomes (S, A, B) and reward (S, A) in the array types of the solvers, copied only if necessary.
+    """Return a model's probabilities (S, A, B) and outcomes (S, A, B), and the reward (S, A), as contiguous arrays of float64 and int64.
+
+    An array that has its type already is not copied.
 
     Raises InvalidValue if the shapes do not fit or the discount is not in [0, 1).
     """
@@ -154,7 +156,8 @@ def policy_iteration(model: OutcomeModel, reward: Array, discount: float = 0.9) 
     """Compute the values of states V (S,) and of actions Q (S, A) under the optimal policy, by policy iteration (Howard 1960).
 
     Each policy is evaluated by a sparse linear solve, so the result is exact except for rounding errors. `model`, `reward` (S, A) and
-    `discount` are as in `value_iteration`. Q is -inf where there is no action; a state without actions has value 0. Raises InvalidValue.
+    `discount` are as in `value_iteration`. Q is -inf where there is no action; a state without actions has value 0.
+    Raises InvalidValue if the shapes do not fit, the discount is not in [0, 1), or the reward of an action is NaN or +inf.
     """
     probabilities, outcomes, reward = tables(model, reward, discount)
     exists = probabilities.any(axis=-1) & (reward != -np.inf)

@@ -26,17 +26,18 @@ Column = NDArray[np.int64]
 class Contact:
     """An overlap of two shapes of the robot, or of a shape of the robot (`first`) and a world object (`second`).
 
-    `first`, `second`: names. `kind`: whether two "solid" volumes overlap, or a "field" is involved. Moving `first` by depth * normal
-    separates the two. `depth`: m. `normal`: (3,) unit vector, root frame. `point`: (3,) m, root frame, midway between the two deepest
-    points. `first_link`, `second_link`: indices of their links; -1: a free world object. An attached object has the link that carries it.
+    `first`, `second`: names. `kind`: "solid": two solids overlap; "field": at least one of the two is a field, a volume that is not solid
+    but causes a repulsive force. Moving `first` by depth * normal separates the two. `depth`: m. `normal`: (3,) unit vector, root frame.
+    `point`: (3,) m, root frame, midway between the two deepest points. `first_link`, `second_link`: indices of the links of `first` and
+    `second`; the link of an attached object is the link that carries it; -1: a free world object.
     """
 
     first: str
     second: str
     kind: Literal["solid", "field"]
-    depth: float  # m
-    normal: Array  # (3,) unit vector, the direction in which `first` must move
-    point: Array  # (3,) m, midway between the two deepest points
+    depth: float
+    normal: Array
+    point: Array
     first_link: int
     second_link: int
 
@@ -95,7 +96,7 @@ class ContactTable:
 
     @property
     def kind(self) -> Column:
-        """The kind of each contact, (c,): 0 for solids, 1 if a field is involved."""
+        """The kind of each contact, (c,): 0: two solids; 1: a field (a volume that causes a repulsive force) is involved."""
         return self.numbers[:, 1]
 
     @property
@@ -157,25 +158,28 @@ def _read(rows: bytearray) -> tuple[Column, Array]:
 
 
 def touched(pose: Pose) -> dict[str, tuple[str, ...]]:
-    """Return for every part, by name, the sorted names of the world objects that touch a solid or field of a link that the part moves.
+    """Return, for each part by name, the sorted names of the free world objects that touch the part in a pose.
 
-    `pose`: one pose, not a batch.
+    An object touches a part if it overlaps a volume of a link that the part's motors move: a solid, or a field, which is a larger volume
+    that causes a repulsive force. Attached objects do not count. `pose`: one pose, not a batch.
     """
     return {part: touched_by(pose, part) for part in pose.robot.parts}
 
 
 def touched_by(pose: Pose, part: str) -> tuple[str, ...]:
-    """Return the sorted names of the world objects that touch a solid or field of a link that the part moves.
+    """Return the sorted names of the free world objects that touch a part in a pose.
 
-    `pose`: one pose, not a batch. `part`: name of the part.
+    An object touches a part if it overlaps a volume of a link that the part's motors move: a solid, or a field, which is a larger volume
+    that causes a repulsive force. Attached objects do not count. `pose`: one pose, not a batch. `part`: name of the part.
     """
     return touched_in(pose.table, links_moved(pose.robot)[part])
 
 
 def touched_in(table: ContactTable, moved: frozenset[int]) -> tuple[str, ...]:
-    """Return the sorted names of the free world objects that touch a solid or field of one of the links `moved` (indices).
+    """Return the sorted names of the free world objects that touch one of the links `moved` (indices).
 
-    `table`: the contacts of one pose.
+    An object touches a link if it overlaps a solid of the link, or a field, which is a larger volume that causes a repulsive force.
+    Attached objects do not count. `table`: the contacts of one pose.
     """
     rows = table.numbers.tolist()
     found = {second for _, _, _, second, first_link, second_link in rows if second_link < 0 and first_link in moved}

@@ -22,7 +22,10 @@ OBJECTS_PER_CELL = 8  # of the grid, on average
 
 @per_robot
 def robot_handle(robot: Robot) -> core.Handle:
-    """Return the handle of the robot in the compiled core, without carried objects; the robot's tables are sent to the core once."""
+    """Return the handle of a robot in the compiled core, without carried objects.
+
+    At the first call for a robot its tables are sent to the core; later calls return the same handle.
+    """
     return core.robot(*robot_tables(robot).for_core())
 
 
@@ -30,12 +33,12 @@ def robot_handle(robot: Robot) -> core.Handle:
 class Scene:
     """A robot in the world of one snapshot, as the compiled core has it; immutable.
 
-    `handle`: of the scene in the core. `nothing`: an empty contact table, for all poses without contacts.
+    `handle`: handle of the scene in the core. `nothing`: an empty contact table, for all poses without contacts.
     """
 
     snapshot: Snapshot
     handle: core.Handle
-    nothing: ContactTable  # of every pose without contacts
+    nothing: ContactTable
 
 
 class _Room(core.Room):
@@ -80,10 +83,12 @@ class Engine:
         return core.jacobians(self._bare, q, link, point)
 
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands, cut: bool = False, threads: int = 1) -> tuple[ContactTable, Array]:
-        """Return all contacts in the poses q (B, n) rad, and the sum of J^T (depth * normal) over the contacts of fields, (B, n) m^2/rad.
+        """Return all contacts in the poses q (B, n) rad, and their projection to the motors, (B, n) m^2/rad.
 
-        `snapshot`: of the world. `reaching`: the hands whose contacts with targets are ignored. `cut`: True: a contact acts only on the
-        motors of its own part, as in the original program. The results are the same for any number of threads.
+        The projection is the sum of J^T (depth * normal) over the contacts of fields, volumes that cause repulsive forces; J is the
+        Jacobian of the contact's point. `snapshot`: the state of the world. `reaching`: the hands that reach for targets; their contacts
+        with targets are ignored. `cut`: True: a contact acts only on the motors of the part that touches, as in the program of 2014; False:
+        also on the motors nearer to the base. The results are the same for any number of threads.
         """
         scene = self.scene_of(snapshot)
         try:
@@ -95,9 +100,12 @@ class Engine:
         return ContactTable(self._shapes, snapshot.names, (numbers, reals)), torque
 
     def contacts_of_one(self, q: bytes, snapshot: Snapshot, reaching: Hands, cut: bool = False) -> tuple[ContactTable, Array]:
-        """Return the contacts of one pose, and the projection (n,) of its contacts of fields to the motors, m^2/rad.
+        """Return the contacts of one pose, and their projection to the motors, (n,) m^2/rad.
 
-        `q`: the pose (n,) rad as bytes of float64. The other arguments are those of `contacts`.
+        The projection is the sum of J^T (depth * normal) over the contacts of fields, volumes that cause repulsive forces; J is the
+        Jacobian of the contact's point. `q`: the pose (n,) rad as bytes of float64. `snapshot`: the state of the world. `reaching`: the
+        hands that reach for targets; their contacts with targets are ignored. `cut`: True: a contact acts only on the motors of the part
+        that touches, as in the program of 2014; False: also on the motors nearer to the base.
         """
         try:
             room = self._rooms.pop()  # atomic: other threads take buffers too

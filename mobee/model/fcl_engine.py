@@ -53,10 +53,12 @@ class FclEngine:
         return point_jacobian(self.robot, transforms, link, moved)
 
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands, cut: bool = False, threads: int = 1) -> tuple[ContactTable, Array]:
-        """Return all contacts in the poses q (B, n) rad, and the sum of J^T (depth * normal) over the contacts of fields, (B, n) m^2/rad.
+        """Return all contacts in the poses q (B, n) rad, and their projection to the motors, (B, n) m^2/rad.
 
-        `snapshot`: of the world. `reaching`: the hands whose contacts with targets are ignored. `cut`: True: a contact acts only on the
-        motors of its own part, as in the original program. `threads` is ignored.
+        The projection is the sum of J^T (depth * normal) over the contacts of fields, volumes that cause repulsive forces; J is the
+        Jacobian of the contact's point. `snapshot`: the state of the world. `reaching`: the hands that reach for targets; their contacts
+        with targets are ignored. `cut`: True: a contact acts only on the motors of the part that touches, as in the program of 2014; False:
+        also on the motors nearer to the base. `threads` is ignored.
         """
         transforms = link_transforms(self.robot, q)
         pairs = self._tested(snapshot, reaching)
@@ -69,9 +71,12 @@ class FclEngine:
         return _table(self.robot, snapshot, numbers, reals), torque
 
     def contacts_of_one(self, q: bytes, snapshot: Snapshot, reaching: Hands, cut: bool = False) -> tuple[ContactTable, Array]:
-        """Return the contacts of one pose, and the projection (n,) of its contacts of fields to the motors, m^2/rad.
+        """Return the contacts of one pose, and their projection to the motors, (n,) m^2/rad.
 
-        `q`: the pose (n,) rad as bytes of float64. The other arguments are those of `contacts`.
+        The projection is the sum of J^T (depth * normal) over the contacts of fields, volumes that cause repulsive forces; J is the
+        Jacobian of the contact's point. `q`: the pose (n,) rad as bytes of float64. `snapshot`: the state of the world. `reaching`: the
+        hands that reach for targets; their contacts with targets are ignored. `cut`: True: a contact acts only on the motors of the part
+        that touches, as in the program of 2014; False: also on the motors nearer to the base.
         """
         table, torque = self.contacts(np.frombuffer(q)[None], snapshot, reaching, cut)
         return table, torque[0]
@@ -222,10 +227,11 @@ SOLID, FIELD = 0, 1
 def tested_pairs(robot: Robot, snapshot: Snapshot, reaching: Hands) -> tuple[Ints, Ints, Ints]:
     """Return the p tested pairs of volumes as three arrays (p,): first volume, second volume and kind (0 solid, 1 field).
 
-    Volumes are numbered: first the robot's shapes, then the world's objects. Pairs of shapes are those of the robot's lists. A free object
-    is tested against every shape but those of the base; a target is not tested against the hands that are `reaching`. An attached object
-    is tested as a solid against free objects, and against the shapes and attached objects of all links against which its own link is
-    tested. Ghosts are not tested. Raises UnknownName for an object that is attached to a link which the robot does not have.
+    Fields are volumes that cause repulsive forces. Volumes are numbered: first the robot's shapes, then the world's objects. Pairs of the
+    robot's own shapes are those in its lists `solid_pairs` and `field_pairs`. A free object is tested against every shape except those of
+    the base; a target is not tested against the hands in `reaching`, which reach for it. An attached object is tested as a solid against
+    free objects, and against the shapes and attached objects of all links against which its own link is tested. Ghosts, objects that are
+    only drawn, are not tested. Raises UnknownName for an object that is attached to a link which the robot does not have.
     """
     own = [(int(a), int(b), kind) for kind, pairs in ((SOLID, robot.solid_pairs), (FIELD, robot.field_pairs)) for a, b in pairs]
     roles = [FIELD if shape.role == "field" else SOLID for shape in robot.shapes]

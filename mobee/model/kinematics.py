@@ -26,15 +26,15 @@ class Tables:
     """
 
     coupling: Array  # (n, J), transposed: joint angles = q @ coupling + offset
-    offset: Array  # (J,)
+    offset: Array
     sine: Array  # (J, 4, 4)
     cosine: Array  # (J, 4, 4)
     slide: Array | None  # (J, 4, 4), None when every joint is revolute
     rounds: tuple[tuple[Ints, Ints], ...]  # (links, ancestors) to join in each doubling round
-    axes: Array  # (J, 3) at zero pose
-    points: Array  # (J, 3) m at zero pose
-    revolute: Array  # (J,) 1 or 0
-    ancestry: tuple[Ints, ...]  # for each link, the joints between it and the base
+    axes: Array
+    points: Array
+    revolute: Array
+    ancestry: tuple[Ints, ...]
 
 
 @per_robot

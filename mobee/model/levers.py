@@ -28,10 +28,10 @@ def lever(robot: Robot, transforms: Array, links: tuple[int, int], point: Array,
 def push_factors(robot: Robot, transforms: Array, links: Ints, depths: Array, points: Array, normals: Array) -> Array:
     """Return the factors (c,) by which the pushes depth * normal of c contacts of fields are multiplied.
 
-    They are 1 if `robot.least_lever` is 0. Otherwise a factor is LEVER^2 / (lever^2 + least_lever^2), with LEVER = 0.5 m, times the depth
-    of the contact divided by the sum of the depths of all contacts between its two links: our extension of thesis eq. 5.11 (docs/law.md).
-    `transforms`: (L, 4, 4) of all links. `links` (c, 2): indices; all free objects (-1) count as one link. `depths` (c,) m, `points`
-    (c, 3) m, `normals` (c, 3): of the contacts, root frame.
+    Fields are volumes that cause repulsive forces, the pushes. The factors are 1 if `robot.least_lever` is 0. Otherwise a factor is LEVER^2
+    / (lever^2 + least_lever^2), with LEVER = 0.5 m, times the depth of the contact divided by the sum of the depths of all contacts between
+    its two links: our extension of thesis eq. 5.11 (docs/law.md). `transforms`: (L, 4, 4) of all links. `links` (c, 2): indices; all free
+    objects (-1) count as one link. `depths` (c,) m, `points` (c, 3) m, `normals` (c, 3): of the contacts, root frame.
     """
     factors = np.ones(len(depths))
     if robot.least_lever <= 0.0:

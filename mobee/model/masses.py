@@ -22,9 +22,9 @@ class Masses:
     pose.
     """
 
-    links: Ints  # (B,)
-    weights: Array  # (B,) kg
-    moments: Array  # (B, 4, 1) kg times (centre, 1), root frame, zero pose
+    links: Ints
+    weights: Array
+    moments: Array
 
     def moved(self, transforms: Array) -> Array:
         """Return the mass times the centre of mass of each link, (..., B, 3) kg m, root frame, in a pose.

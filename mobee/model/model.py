@@ -31,8 +31,9 @@ Reaching = str | Sequence[str] | None
 class Model:
     """A robot in a world: evaluates poses, in any number of threads, while other threads edit the world.
 
-    Each evaluation uses one snapshot of the world and never waits for an edit. `world`: None: an empty one. `engine`: "compiled", or "fcl",
-    an independent and slow reference. Raises InvalidValue or UnknownName for other arguments.
+    Each evaluation uses one snapshot of the world and never waits for an edit. `world`: the objects around the robot; None: an empty world.
+    `engine`: "compiled", the engine in C++, or "fcl", an independent and slow reference. Raises InvalidValue if `robot` or `world` has
+    another type, and UnknownName for another engine.
     """
 
     def __init__(self, robot: Robot, world: World | None = None, engine: Literal["compiled", "fcl"] = "compiled") -> None:
@@ -64,8 +65,9 @@ class Model:
     def hand(self, marker: str) -> Hand:
         """Return the hand of a marker: the links whose contacts with targets are ignored while the marker reaches; raises UnknownName.
 
-        These are the marker's link and all links that it carries. If fields of earlier links of the same part contain the marker at home,
-        the fields of the earliest such link (nearest to the base) and of all links that it carries are ignored too.
+        These are the marker's link and all links that it carries. At home, the marker may also be inside fields (volumes that cause
+        repulsive forces) of earlier links of the same part. Then contacts of the fields of the earliest such link, which is nearest to the
+        base, and of all links that it carries are ignored too.
         """
         known = self._hand_of.get(marker)
         if known is None:
@@ -138,8 +140,8 @@ class Model:
     def attach(self, name: str, link: str, q: ArrayLike) -> None:
         """Attach a world object to a link, so that it moves with the link from now on.
 
-        Its pose relative to the link is that while the robot is at q (n,) rad. The world takes q as the robot's present pose
-        (`World.follow`). Raises UnknownName and InvalidValue.
+        The object keeps the position and rotation relative to the link that it has while the robot is at q (n,) rad. The pose at q becomes
+        the robot's present pose in the world, as if `World.follow` was called with it. Raises UnknownName and InvalidValue.
         """
         pose = self.evaluate(q)
         carrier = link_pose(pose, link)

@@ -22,9 +22,11 @@ class Finder(Protocol):
     """An object that computes the contacts of poses, as an engine or a list of neighbouring pairs (`mobee.model.track.Neighbours`)."""
 
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands) -> tuple[ContactTable, Array]:
-        """Return all contacts in the poses q (B, n) rad, and the sum of J^T (depth * normal) over the contacts of fields, (B, n) m^2/rad.
+        """Return all contacts in the poses q (B, n) rad, and their projection to the motors, (B, n) m^2/rad.
 
-        `snapshot`: of the world. `reaching`: the hands whose contacts with targets are ignored.
+        The projection is the sum of J^T (depth * normal) over the contacts of fields, volumes that cause repulsive forces; J is the
+        Jacobian of the contact's point. `snapshot`: the state of the world. `reaching`: the hands that reach for targets; their contacts
+        with targets are ignored.
         """
 
 
@@ -41,16 +43,21 @@ class Engine(Protocol):
         """
 
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands, cut: bool = False, threads: int = 1) -> tuple[ContactTable, Array]:
-        """Return all contacts in the poses q (B, n) rad, and the sum of J^T (depth * normal) over the contacts of fields, (B, n) m^2/rad.
+        """Return all contacts in the poses q (B, n) rad, and their projection to the motors, (B, n) m^2/rad.
 
-        `snapshot`: of the world. `reaching`: the hands whose contacts with targets are ignored. `cut`: True: a contact acts only on the
-        motors of its own part, as in the original program.
+        The projection is the sum of J^T (depth * normal) over the contacts of fields, volumes that cause repulsive forces; J is the
+        Jacobian of the contact's point. `snapshot`: the state of the world. `reaching`: the hands that reach for targets; their contacts
+        with targets are ignored. `cut`: True: a contact acts only on the motors of the part that touches, as in the program of 2014; False:
+        also on the motors nearer to the base.
         """
 
     def contacts_of_one(self, q: bytes, snapshot: Snapshot, reaching: Hands, cut: bool = False) -> tuple[ContactTable, Array]:
-        """Return the contacts of one pose, and the projection (n,) of its contacts of fields to the motors, m^2/rad.
+        """Return the contacts of one pose, and their projection to the motors, (n,) m^2/rad.
 
-        `q`: the pose (n,) rad as bytes of float64. The other arguments are those of `contacts`.
+        The projection is the sum of J^T (depth * normal) over the contacts of fields, volumes that cause repulsive forces; J is the
+        Jacobian of the contact's point. `q`: the pose (n,) rad as bytes of float64. `snapshot`: the state of the world. `reaching`: the
+        hands that reach for targets; their contacts with targets are ignored. `cut`: True: a contact acts only on the motors of the part
+        that touches, as in the program of 2014; False: also on the motors nearer to the base.
         """
 
 
@@ -129,10 +136,11 @@ class Pose:
 
     @property
     def projection(self) -> Array:
-        """The contacts of fields projected to the motors: sum of J^T (depth * normal), (..., n) in [m^2/rad] (the sum in thesis eq. 5.11).
+        """The projection of the contacts to the motors: the sum of J^T (depth * normal), (..., n) m^2/rad (the sum in thesis eq. 5.11).
 
-        In a contact of two links, the push acts on the first link, and the opposite push on the second. A push acts on all motors from its
-        link down to the base. With a least lever of the robot the pushes have factors (`mobee.model.levers.push_factors`).
+        The sum is over the contacts of fields, volumes that cause repulsive forces; J is the Jacobian of the contact's point. In a contact
+        of two links, the push acts on the first link, and the opposite push on the second. A push acts on all motors from its link down to
+        the base. If the robot has a least lever, each push is multiplied by a factor (`mobee.model.levers.push_factors`).
         """
         evaluated = self._evaluated
         if evaluated is None:
@@ -141,10 +149,10 @@ class Pose:
 
     @property
     def projection_of_part(self) -> Array:
-        """The contacts of fields projected to the motors, as `projection`, but each push acts only on the motors of its link's own part.
+        """The projection of the contacts to the motors, (..., n) m^2/rad, in which a push acts only on the motors of its link's own part.
 
-        So a contact of an arm does not act on the motors of the torso. The original program of 2014 projected contacts like this. Shape
-        (..., n) in [m^2/rad].
+        It is the sum of J^T (depth * normal) over the contacts of fields (volumes that cause repulsive forces), as `projection`, but a
+        contact of an arm, for example, does not act on the motors of the torso. The original program of 2014 projected contacts like this.
         """
         return self._computed(True)[1]
 

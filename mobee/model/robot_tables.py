@@ -32,44 +32,45 @@ class Carried:
     """
 
     link: int
-    row: Volumes  # () VOLUME, in the link's frame
+    row: Volumes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RobotTables:
-    """The tables that core/robot.cpp reads: of S shapes in the order of C clusters, of J joints, and of the V corners of all hulls.
+    """The tables of a robot that core/robot.cpp reads: S shapes in the order of C clusters, J joints, and the V corners of all hulls.
 
-    `motors`: their number. `own_shapes`: number of shapes without carried objects. `least_lever`: m. Joints: `parent` (J,) link that
-    carries it; `slides` (J,) whether it is prismatic; `border` (J,) whether the link that it moves belongs to another part than `parent`;
-    `axis` (J, 3); `point` (J, 3) m; `motor` (K, J) its motors, at most K; `scale` (K, J) joint angle per motor angle; `offset` (J,);
-    `travel` (K, J) its motion when the motor moves by an angle of 1 in the control law. Shapes: `volume` (S,) rows of VOLUME; `link` (S,);
-    `name` (S,) index into the robot's shapes, then the carried objects; `field` (S,); `meets_world` (S,) whether it is tested against free
-    objects; `cluster` (C + 1,) first shape of each cluster; `tested` (S, S) whether two shapes are tested against each other. Corners:
-    `corner` (V, 3) m, in the axes of the hull; `edge_start` (V + 1,) first edge of each corner; `edge`: the corner at the other end.
+    `motors`: number of motors. `own_shapes`: number of shapes without carried objects. `least_lever`: m. Joints: `parent` (J,) the link
+    that carries the joint; `slides` (J,) whether it is prismatic; `border` (J,) whether the link that the joint moves belongs to another
+    part than `parent`; `axis` (J, 3); `point` (J, 3) m; `motor` (K, J) the at most K motors that drive the joint; `scale` (K, J) joint
+    angle per motor angle; `offset` (J,); `travel` (K, J) motion of the joint [rad or m] when the motor moves by what counts as 1 rad in the
+    control law. Shapes: `volume` (S,) rows of VOLUME; `link` (S,); `name` (S,) index into the robot's shapes, then the carried objects;
+    `field` (S,) whether it is a field, which causes repulsive forces; `meets_world` (S,) whether it is tested against free objects;
+    `cluster` (C + 1,) first shape of each cluster; `tested` (S, S) whether two shapes are tested against each other. Corners: `corner` (V,
+    3) m, in the axes of the hull; `edge_start` (V + 1,) first edge of each corner; `edge`: the corner at the other end.
     """
 
     motors: int
-    own_shapes: int  # without carried objects
-    parent: Ints  # (J,) links
-    slides: Flags  # (J,)
-    border: Flags  # (J,) whether the link that it moves belongs to another part than the link that it is mounted on
-    axis: Array  # (J, 3)
-    point: Array  # (J, 3) m
-    motor: Ints  # (K, J) each joint's motors, K the largest number of motors on one joint
-    scale: Array  # (K, J) joint angle per motor angle
-    offset: Array  # (J,)
-    volume: Volumes  # (S,)
-    link: Ints  # (S,)
-    name: Ints  # (S,) index into the robot's shapes; from len(robot.shapes) on, into the carried objects
-    field: Flags  # (S,)
-    meets_world: Flags  # (S,)
-    cluster: Ints  # (C + 1,) the first shape of each cluster
-    tested: Flags  # (S, S) symmetric: which two shapes are tested against each other
-    corner: Array  # (V, 3) m, in the axes of their hull
-    edge_start: NDArray[np.int32]  # (V + 1,) where the edges of each corner begin
-    edge: NDArray[np.int32]  # the corner of the same hull that each edge leads to
-    travel: Array  # (K, J) motion of the joint when the motor moves by the angle 1 of the law
-    least_lever: float  # m
+    own_shapes: int
+    parent: Ints
+    slides: Flags
+    border: Flags
+    axis: Array
+    point: Array
+    motor: Ints
+    scale: Array
+    offset: Array
+    volume: Volumes
+    link: Ints
+    name: Ints
+    field: Flags
+    meets_world: Flags
+    cluster: Ints
+    tested: Flags
+    corner: Array
+    edge_start: NDArray[np.int32]
+    edge: NDArray[np.int32]
+    travel: Array
+    least_lever: float
 
     def for_core(self) -> tuple[dict[str, float], dict[str, NDArray[Any]]]:
         """Return the single numbers and the contiguous arrays, each by name, in the form that `mobee._core.engine.robot` needs."""
@@ -206,9 +207,9 @@ def _tested(robot: Robot, carried: Sequence[Carried]) -> Flags:
 
 
 def meets(robot: Robot, link: int, other: int) -> bool:
-    """Return whether an object attached to `link` is tested for contacts against the link `other` (indices).
+    """Return whether an object that is attached to `link` is tested for contacts with the link `other` (indices).
 
-    It is if they are two different links, and the pair is not excluded from the tests.
+    It is tested if the two links are different, and the pair of links is not in `robot.untested`.
     """
     pair: LinkPair = frozenset((link, other))
     return link != other and pair not in robot.untested

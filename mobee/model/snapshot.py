@@ -27,17 +27,18 @@ _CARRIED: dict[Role, int] = {"obstacle": ATTACHED, "target": ATTACHED, "ghost": 
 class Snapshot:
     """An immutable state of the world; each edit of the world makes the next snapshot.
 
-    `version`: number of edits. `objects`: by name, in the order in which they were added; `names`, `rows` and `roles` have the same order.
-    `rows` (N,): the volumes as rows of VOLUME (`mobee.model.volumes`); those of attached objects are in the frame of their link. `roles`
-    (N,): OBSTACLE, TARGET, GHOST, or for attached objects ATTACHED and ATTACHED_GHOST. `attached`: names of the attached objects.
+    `version`: number of edits. `objects`: the objects by name, in the order in which they were added; `names`, `rows` and `roles` have the
+    same order. `rows` (N,): the volumes as rows of VOLUME (`mobee.model.volumes`); those of attached objects are in the frame of their
+    link. `roles` (N,): OBSTACLE, TARGET or GHOST (an object that is only drawn); for an attached object ATTACHED, or ATTACHED_GHOST if it
+    is a ghost. `attached`: names of the attached objects.
     """
 
     version: int
     objects: MappingProxyType[str, WorldObject]
     names: tuple[str, ...]
     rows: Volumes  # (N,) VOLUME, contiguous
-    roles: NDArray[np.int64]  # (N,)
-    attached: tuple[str, ...]  # names of attached objects
+    roles: NDArray[np.int64]
+    attached: tuple[str, ...]
 
 
 EMPTY = Snapshot(0, MappingProxyType({}), (), np.empty(0, dtype=VOLUME), np.empty(0, dtype=np.int64), ())
@@ -93,14 +94,15 @@ MAX_HANDS = 2  # hands that may reach at once; as `most_hands` in core/scene.hpp
 
 @dataclass(frozen=True, slots=True)
 class Hand:
-    """The links of one reaching hand, by index, whose contacts with targets are ignored.
+    """The links of one reaching hand, whose contacts with targets are ignored.
 
-    `link`: of this link, and of all links that it carries, solids and fields are ignored. `fields`: of this link, and of all links that it
-    carries, only fields are ignored; it is the same link as `link`, or an earlier link of the part.
+    `link`: index of a link; contacts of its solids and fields, and of those of all links that it carries, are ignored. `fields`: index of a
+    link; contacts of its fields only, and of the fields of all links that it carries, are ignored. It is the same link as `link`, or an
+    earlier link of the part. A field is a volume that causes a repulsive force.
     """
 
-    link: int  # all of its volumes are exempt
-    fields: int  # its fields are exempt; the same link, or one before it
+    link: int
+    fields: int
 
 
 Hands = tuple[Hand, ...]

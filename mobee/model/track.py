@@ -22,7 +22,7 @@ class Neighbours:
     """Computes the contacts of a robot in consecutive poses, with a list of the pairs of volumes that are near each other.
 
     An object is for one thread at a time. `skin`: m; pairs nearer than this are in the list. `cut`: True: a contact acts only on the motors
-    of its own part, as in the original program.
+    of the part that touches, as in the program of 2014; False: also on the motors nearer to the base.
     """
 
     def __init__(self, engine: Engine, skin: float, cut: bool = False) -> None:
@@ -31,10 +31,11 @@ class Neighbours:
         self._known: tuple[Scene, Hands] | None = None
 
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands) -> tuple[ContactTable, Array]:
-        """Return all contacts in the consecutive poses q (B, n) rad, and the projection of the contacts of fields, (B, n) m^2/rad.
+        """Return all contacts in the consecutive poses q (B, n) rad, and their projection to the motors, (B, n) m^2/rad.
 
-        The projection is the sum of J^T (depth * normal). `snapshot`: of the world. `reaching`: the hands whose contacts with targets are
-        ignored.
+        The projection is the sum of J^T (depth * normal) over the contacts of fields, volumes that cause repulsive forces; J is the
+        Jacobian of the contact's point. `snapshot`: the state of the world. `reaching`: the hands that reach for targets; their contacts
+        with targets are ignored.
         """
         self.enter(snapshot, reaching)
         numbers, reals, torque = self._core.follow(q)
@@ -56,8 +57,9 @@ class Neighbours:
 class Track:
     """Evaluates consecutive poses of one model, of which each is near the one before: the same results as `Model.evaluate`, faster.
 
-    Pairs of volumes that are farther apart than the skin are not checked until a volume has moved by half the skin. A track takes little
-    time to make and is for one thread at a time. For large steps between poses it is as fast as `Model.evaluate`.
+    The argument `skin` of `Model.track` is a distance: pairs of volumes that are farther apart are not checked until a volume has moved by
+    half this distance. A track takes little time to make and is for one thread at a time. For large steps between poses it is as fast as
+    `Model.evaluate`.
     """
 
     def __init__(self, model: Model, engine: object, skin: float) -> None:
@@ -73,7 +75,8 @@ class Track:
         """Return the pose at q (n,) rad, or the poses along a path q (..., n) rad, evaluated in this order.
 
         `reaching`: name of the marker that reaches for the targets, or names of up to two; None: none. The contacts are computed at once,
-        not when they are read. Raises InvalidValue, UnknownName as `Model.evaluate`.
+        not when they are read. Raises InvalidValue if q has another shape or is not finite, and UnknownName if the robot does not have the
+        marker.
         """
         pose = self._model.evaluate(q, reaching=reaching)
         if self._neighbours is not None:

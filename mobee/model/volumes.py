@@ -39,7 +39,10 @@ class Volume(Protocol):
 
     @property
     def size(self) -> tuple[float, ...]:
-        """The lengths of the volume [m], as in `mobee.robot.robot.Shape.size`."""
+        """The lengths of the volume [m], as in `mobee.robot.robot.Shape.size`.
+
+        Sphere: radius; capsule and cylinder: radius and height; box: full edges x, y and z; convex: no lengths.
+        """
 
     @property
     def position(self) -> Array:
@@ -65,14 +68,14 @@ def bound(volume: Volume, vertices: Array | None = None) -> float:
 
 
 def volume_row(volume: Volume) -> Volumes:
-    """Return the description of a sphere, capsule, cylinder or box for the core: one row of VOLUME, shape ()."""
+    """Return the description of a sphere, capsule, cylinder or box for the core: a 0-dimensional array of the type VOLUME."""
     size = volume.size
     half = [length / 2.0 for length in size] if volume.kind == "box" else [size[0], size[1] / 2.0 if len(size) > 1 else 0.0, 0.0]
     return _row(volume, half, bound(volume))
 
 
 def convex_row(volume: Volume, vertices: Array, first: int) -> Volumes:
-    """Return the description of a convex volume for the core: one row of VOLUME, shape ().
+    """Return the description of a convex volume for the core: a 0-dimensional array of the type VOLUME.
 
     `vertices`: (v, 3) m, relative to its position. `first`: index of the first vertex in the core's table of corners.
     """

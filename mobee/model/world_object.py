@@ -83,22 +83,24 @@ _MAX_LENGTH_ERROR, _MAX_SKEW = 1.1e-5, 1e-6  # of a rotation: of the squares of 
 class WorldObject:
     """A volume in the world.
 
-    `kind`, `size`: as in `Geometry`. `position` (3,) m, `rotation` (3, 3): in the root frame; of an attached object, in the frame of
+    `kind`: "sphere", "capsule", "cylinder" or "box". `size` in m, as in `Geometry`: sphere (radius,); capsule and cylinder (radius,
+    height); box (x, y, z), full edges. `position` (3,) m, `rotation` (3, 3): in the root frame; for an attached object, in the frame of
     `link`, which is the root frame at zero pose. `role`: "obstacle", "target" or "ghost". `color`: red, green, blue and opacity, each 0 to
-    1; None: not stated. `link`: name of the link that carries it; None: it is free. `mass`: kg, of an object that a physics engine moves
-    when it is pushed; None: it does not move. `friction`: coefficient of an object with a mass, with everything that it touches.
+    1; None: not stated. `link`: name of the link that carries the object; None: it is attached to none. `mass`: kg, of an object that a
+    physics engine moves when it is pushed; None: it does not move. `friction`: coefficient of an object with a mass, with everything that
+    it touches.
     """
 
     name: str
     kind: ShapeKind
-    size: tuple[float, ...]  # as Geometry
-    position: Array  # (3,) m
-    rotation: Array  # (3, 3)
+    size: tuple[float, ...]
+    position: Array
+    rotation: Array
     role: Role = "obstacle"
-    color: Color | None = None  # red, green, blue, opacity in 0..1
+    color: Color | None = None
     link: str | None = None
-    mass: float | None = None  # kg, of an object that moves in a physics engine when it is pushed; None: it does not move
-    friction: float = FRICTION  # coefficient, of an object with a mass, at everything that it touches
+    mass: float | None = None
+    friction: float = FRICTION
 
     @property
     def movable(self) -> bool:
@@ -128,7 +130,7 @@ def valid_name(name: str) -> str:
 def valid_shape(name: str, shape: Geometry) -> Geometry:
     """Return the shape of a world object unchanged; raises InvalidValue unless it is a sphere, capsule, cylinder or box of valid lengths.
 
-    `name`: of the object, for the message.
+    `name`: name of the object, for the message.
     """
     if not isinstance(shape, Geometry):
         raise InvalidValue(f"world object {name!r}: shape {shape!r}; it must be a Geometry, as sphere(0.1), box, cylinder or capsule.")
@@ -142,7 +144,10 @@ def valid_shape(name: str, shape: Geometry) -> Geometry:
 
 
 def valid_position(name: str, given: ArrayLike) -> Array:
-    """Return a copy of a position (3,) m; raises InvalidValue unless it is three finite numbers. `name`: of the object, for the message."""
+    """Return a copy of a position (3,) m; raises InvalidValue unless it is three finite numbers.
+
+    `name`: name of the object, for the message.
+    """
     value = _numbers(given)
     if value is None or value.shape != (3,) or not np.isfinite(value).all():
         raise InvalidValue(f"world object {name!r}: position {given!r}; it must be three finite numbers in metres.")
@@ -152,7 +157,7 @@ def valid_position(name: str, given: ArrayLike) -> Array:
 def valid_rotation(name: str, given: ArrayLike) -> Array:
     """Return a copy of a rotation (3, 3); raises InvalidValue unless it is orthonormal and right-handed.
 
-    `name`: of the object, for the message.
+    `name`: name of the object, for the message.
     """
     value = _numbers(given)
     if value is None or value.shape != (3, 3) or not _is_rotation(value):
@@ -184,7 +189,7 @@ def _is_rotation(value: Array) -> bool:
 def valid_role(name: str, role: Role) -> Role:
     """Return the role unchanged; raises InvalidValue unless it is "obstacle", "target" or "ghost".
 
-    `name`: of the object, for the message.
+    `name`: name of the object, for the message.
     """
     if role not in get_args(Role):
         raise InvalidValue(f"world object {name!r}: role {role!r}; valid: {', '.join(get_args(Role))}.")
@@ -194,7 +199,7 @@ def valid_role(name: str, role: Role) -> Role:
 def valid_mass(name: str, mass: float | None) -> float | None:
     """Return the mass [kg] as a float, or None for an object that does not move; raises InvalidValue unless it is above 0, at most 10 t.
 
-    `name`: of the object, for the message.
+    `name`: name of the object, for the message.
     """
     if mass is not None and not (_is_number(mass) and 0.0 < mass <= HEAVIEST):
         raise InvalidValue(f"world object {name!r}: mass {mass!r}; it must be above 0 and at most {HEAVIEST:g} kg.")
@@ -202,7 +207,10 @@ def valid_mass(name: str, mass: float | None) -> float | None:
 
 
 def valid_friction(name: str, friction: float) -> float:
-    """Return the coefficient of friction as a float; raises InvalidValue unless it is 0 to 10. `name`: of the object, for the message."""
+    """Return the coefficient of friction as a float; raises InvalidValue unless it is 0 to 10.
+
+    `name`: name of the object, for the message.
+    """
     if not (_is_number(friction) and 0.0 <= friction <= ROUGHEST):
         raise InvalidValue(f"world object {name!r}: friction {friction!r}; it must be a coefficient of 0 to {ROUGHEST:g}.")
     return float(friction)
@@ -215,7 +223,7 @@ def _is_number(value: object) -> bool:
 def valid_color(name: str, given: Sequence[float] | None) -> Color | None:
     """Return a colour as (red, green, blue, opacity), the opacity 1 if not given; None for None.
 
-    `name`: of the object, for the message. Raises InvalidValue unless there are 3 or 4 numbers, each 0 to 1.
+    `name`: name of the object, for the message. Raises InvalidValue unless there are 3 or 4 numbers, each 0 to 1.
     """
     if given is None:
         return None

@@ -36,14 +36,14 @@ class State:
 
     robot: Robot
     gains: Gains
-    q: Array  # rad, measured
-    velocity: Array  # q', rad/s: the law's own state, never a difference of encoder values
-    attractor: Array  # q*, rad
-    contacts: Sequence[Contact] = ()  # at q, as `Model.evaluate(q).contacts` gives them
-    force: Array | None = None  # f of eq. 5.9, the client's force on the motors, rad/s^2
-    pushes: Mapping[str, Array] = field(default_factory=dict)  # f_m of eq. 5.10 by marker: force (3,), or force and moment (6,)
-    propagate: Literal["tree", "part"] = "tree"  # how far down the body a contact acts, see `projected`
-    goal_velocity: Array | None = None  # q*', rad/s, of an attractor that moves
+    q: Array
+    velocity: Array
+    attractor: Array
+    contacts: Sequence[Contact] = ()
+    force: Array | None = None
+    pushes: Mapping[str, Array] = field(default_factory=dict)
+    propagate: Literal["tree", "part"] = "tree"
+    goal_velocity: Array | None = None
 
 
 def squash(v: Array, maximum: Array | float, slope: Array | float) -> Array:
@@ -142,16 +142,17 @@ def limit_force(s: State) -> Array:
 def clause_force(s: State) -> Array:
     """Return f_cst (eqs. 5.14 to 5.17), (n,) rad/s^2, which keeps all clauses satisfied, in the variant of the law that `gains.law` names.
 
-    A clause acts while none of its rows holds with a margin of `constraint_width`. A row holds when a.q + b > 0, the convention of the
-    robot files; the thesis prints n.q < b (eq. 5.14).
+    A clause is a condition on motor positions: at least one of its rows must hold. It acts while none of its rows holds with a margin of
+    `constraint_width`. A row holds when a.q + b > 0, the convention of the robot files; the thesis prints n.q < b (eq. 5.14).
     """
     return clauses_2014(s) if s.gains.law == "published_2014" else clauses_default(s)
 
 
 def clauses_default(s: State) -> Array:
-    """Return f_cst of the default law, (n,) rad/s^2: each clause pushes along the unit normals of all its rows (eqs. 5.15, 5.17).
+    """Return f_cst of the default law, (n,) rad/s^2: each acting clause pushes along the unit normals of all its rows (eqs. 5.15, 5.17).
 
-    The size of the push is computed from the row that is nearest to being satisfied, so that the force is continuous.
+    A clause is a condition on motor positions: at least one of its rows a.q + b > 0 must hold. The size of the push is computed from the
+    row that is nearest to being satisfied, so that the force is continuous.
     """
     unit, total = motor_units(s.robot), np.zeros(len(s.q))
     for clause in s.robot.clauses:
@@ -163,10 +164,10 @@ def clauses_default(s: State) -> Array:
 
 
 def clauses_2014(s: State) -> Array:
-    """Return f_cst of the 2014 program, (n,) rad/s^2.
+    """Return f_cst, the force that keeps the clauses (conditions on motor positions) satisfied, of the 2014 program, (n,) rad/s^2.
 
-    The width of the zone is in units of a.q + b. Every row of an acting clause pushes in proportion to its own deficit, which is 0 where
-    the zone begins and 1 at the boundary. The sum is clipped to +-1 for each motor and multiplied by `max_constraint`.
+    The zone in which a clause acts has a width in units of a.q + b. Every row of an acting clause pushes in proportion to its own deficit,
+    which is 0 where the zone begins and 1 at the boundary. The sum is clipped to +-1 for each motor and multiplied by `max_constraint`.
     """
     unit, total = motor_units(s.robot), np.zeros(len(s.q))
     for clause in s.robot.clauses:
@@ -179,17 +180,18 @@ def clauses_2014(s: State) -> Array:
 def contact_force(s: State) -> Array:
     """Return the collision force f_coll = L(sum over contact points g of J(g)^T f_g) (eq. 5.11), (n,) rad/s^2.
 
-    f_g = +-depth * normal, in m: each contact of fields pushes the two volumes apart, in proportion to its depth.
-    `projected` computes the sum, `bounded_contact` is L.
+    f_g = +-depth * normal, in m: each contact of fields (volumes that cause repulsive forces) pushes the two volumes apart, in proportion
+    to its depth. `projected` computes the sum, `bounded_contact` is L.
     """
     return bounded_contact(s.robot, s.gains, projected(s.robot, s.q, s.contacts, s.propagate))
 
 
 def projected(robot: Robot, q: Array, contacts: Iterable[Contact], propagate: Literal["tree", "part"] = "tree") -> Array:
-    """Return the sum in eq. 5.11: J(g)^T f_g over both sides g of every contact of fields, f_g = +-depth * normal; (n,) in m^2/rad.
+    """Return the sum in eq. 5.11 of J(g)^T f_g over both sides g of every contact of fields, with f_g = +-depth * normal; (n,) m^2/rad.
 
-    `propagate`: "tree": a contact acts on all motors from its link down to the base; "part": only on the motors of the part that touches,
-    as in the original program. For a robot with a least lever, f_g is multiplied by `push_factor`.
+    A field is a volume that causes a repulsive force; contacts of solids do not count. `propagate`: "tree": a contact acts on all motors
+    from its link down to the base; "part": only on the motors of the part that touches, as in the original program. If `robot.least_lever`
+    is above 0, f_g is multiplied by `push_factor`.
     """
     frames, per_joint, contacts = link_frames(robot, q), np.zeros(len(robot.joints)), list(contacts)
     for contact in contacts:
@@ -206,10 +208,11 @@ def projected(robot: Robot, q: Array, contacts: Iterable[Contact], propagate: Li
 def push_factor(robot: Robot, frames: Array, contact: Contact, contacts: Sequence[Contact]) -> float:
     """Return the factor by which the push of a contact of fields is multiplied; 1 for a robot without a least lever.
 
-    For a robot with a least lever it is LEVER^2 / (|J|^2 + least_lever^2), with LEVER = 0.5 m, times the depth of the contact divided by
-    the sum of the depths of all contacts of fields between the same two links. J (n,) is the change of the depth per motion of each motor
-    by 1 rad (of a slide, by its `unit`). With this factor J^T pushes along the smallest motion that ends the contact, for any lever, and
-    all contacts between two links together push as one. `frames`: (L, 4, 4), as from `link_frames`. `contacts`: all contacts of the pose.
+    A field is a volume that causes a repulsive force, the push. For a robot with a least lever the factor is LEVER^2 / (|J|^2 +
+    least_lever^2), with LEVER = 0.5 m, times the depth of the contact divided by the sum of the depths of all contacts of fields between
+    the same two links. J (n,) is the change of the depth per motion of each motor by 1 rad (of a slide, by its `unit`). With this factor
+    J^T pushes along the smallest motion that ends the contact, for any lever, and all contacts between two links together push as one.
+    `frames`: (L, 4, 4), as from `link_frames`. `contacts`: all contacts of the pose.
     """
     if robot.least_lever == 0.0:
         return 1.0

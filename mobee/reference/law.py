@@ -53,16 +53,17 @@ class Motion:
     commanded last; it differs from `velocity` only for a part that was just put in hold. `reference`: rad, the position command.
     """
 
-    velocity: Array  # rad/s, the system's own q'
-    acceleration: Array  # rad/s^2, of the commanded velocity
-    sent: Array  # rad/s, the velocity commanded last; differs from `velocity` only for a part that was just put in hold
-    reference: Array  # rad, the position command
+    velocity: Array
+    acceleration: Array
+    sent: Array
+    reference: Array
 
 
 def acceleration(state: State, terms: Sequence[Term] = TERMS) -> Array:
     """Return q" of eq. 5.7 with mass 1, (n,) rad/s^2: the sum of all terms, plus C q*' for an attractor that moves.
 
-    `terms`: the forces, each a function of the state; spring and damping are recognised among them.
+    `terms`: the forces, each a function of the state; the functions `spring` and `damping` among them are treated separately, because the
+    last term is reduced by all other forces.
     """
     total, outside = np.zeros(len(state.q)), np.zeros(len(state.q))
     for term in terms:
@@ -76,7 +77,7 @@ def acceleration(state: State, terms: Sequence[Term] = TERMS) -> Array:
 def at_rest(robot: Robot, gains: Gains, q: Array) -> Motion:
     """Return the state of the dynamical system at rest at the measured q (n,) rad.
 
-    The position reference is q; for a motor of weight 0 in the gains, q clipped to the motor's limits.
+    The position reference is q; for a motor with weight 0 in the gains, which the law never moves, it is q clipped to the motor's limits.
     """
     still = np.zeros(len(q))
     return Motion(still, still, still, np.where(gains.weight(robot.motors) > 0, q, np.clip(q, *robot.limits.T)))

@@ -20,7 +20,8 @@ IMAGINED = {"50-50": ("stay", "goal"), "60-40": ("stay", "goal", "goal")}  # out
 def observe(bins: Bins, outcome: int) -> tuple[Bins, float]:
     """Count an outcome (state) of a state-action (Algorithm 6); return the new counts and the reward R = KL(P || T) in nats (eq. 6.5).
 
-    T is the distribution before the observation, P that after it: sum over the bins j of ln(P_j / T_j) P_j. Examples: eqs. 6.6 to 6.9.
+    `bins`: dict from each state that was an outcome to its count; an outcome that it does not contain gets the count 2. T is the
+    distribution before the observation, P that after it: R is the sum over the bins j of ln(P_j / T_j) P_j. Examples: eqs. 6.6 to 6.9.
     """
     before = bins if outcome in bins else bins | {outcome: 1.0}  # a new bin starts at 1
     after = before | {outcome: before[outcome] + 1.0}
@@ -28,10 +29,10 @@ def observe(bins: Bins, outcome: int) -> tuple[Bins, float]:
 
 
 def imagined(state: int, goal: int, initial: str = "50-50") -> tuple[Bins, float]:
-    """Return the counts of an action before it is tried, from imagined outcomes, and its first reward in nats (Algorithm 8, table 6.1).
+    """Return the counts of an action before it is tried, a dict from state to count, and its first reward in nats (Algorithm 8, table 6.1).
 
-    `state`, `goal`: the state of the action and its goal. `initial`: "50-50" (one failure, which stays in the state, and one success) or
-    "60-40" (one failure and two successes).
+    The counts are those of imagined outcomes, observed as if they were real. `state`, `goal`: the state in which the action begins, and its
+    goal state. `initial`: "50-50" (one failure, which stays in the state, and one success) or "60-40" (one failure and two successes).
     """
     bins, reward = Bins(), 0.0
     for end in IMAGINED[initial]:
@@ -42,13 +43,14 @@ def imagined(state: int, goal: int, initial: str = "50-50") -> tuple[Bins, float
 def forget(bins: Bins, floor: Bins, factor: float) -> Bins:
     """Multiply the counts of real observations by `factor` and return all counts; an agent that forgets does this before each observation.
 
-    Imagined counts are not changed. `floor`: the imagined count of each bin; 1 for a bin that it does not contain.
+    `bins`: dict from state to count. Each count is the sum of an imagined count, from before the first try, which is not changed, and of
+    real observations. `floor`: dict from state to imagined count; the imagined count of a state that it does not contain is 1.
     """
     return {end: floor.get(end, 1.0) + factor * (count - floor.get(end, 1.0)) for end, count in bins.items()}
 
 
 def observe_among_all(counts: Array, outcome: int) -> tuple[Array, float]:
-    """Count an outcome in a model with a bin for each state (thesis 6.4.2); return the new counts (S,) and the reward in nats.
+    """Count an outcome in a model with a count for each state (thesis 6.4.2); return the new counts (S,) and the reward in nats.
 
     `counts`: (S,), 1 for each state before the first observation. `outcome`: index of a state.
     """
@@ -58,7 +60,7 @@ def observe_among_all(counts: Array, outcome: int) -> tuple[Array, float]:
 
 
 def probabilities(bins: Bins) -> Bins:
-    """Return T(s, a) as a distribution, state -> probability: each count divided by the sum of all counts (thesis eq. 6.1)."""
+    """Return T(s, a) as a dict from state to probability: each count in `bins` divided by the sum of all counts (thesis eq. 6.1)."""
     total = sum(bins.values())
     return {end: count / total for end, count in bins.items()}
 

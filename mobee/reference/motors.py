@@ -34,16 +34,16 @@ class MotorState:
     for each substep, the newest last.
     """
 
-    q: Array  # rad, joint side
-    velocity: Array  # rad/s, joint side
-    motor_q: Array  # rad, motor side
-    motor_velocity: Array  # rad/s, motor side
-    mode: NDArray[np.str_]  # "position", "velocity", "torque" or "hold"
-    reference: Array  # rad, rad/s or N m, by mode
-    resting: NDArray[np.bool_]  # in hold: whether the motor has come to rest
-    rest: Array  # in hold: where it came to rest, rad
-    load: Array  # N m, the robot's weight, which acts on motors in torque mode
-    line: list[Array]  # rad/s, for a motor in torque mode N m
+    q: Array
+    velocity: Array
+    motor_q: Array
+    motor_velocity: Array
+    mode: NDArray[np.str_]
+    reference: Array
+    resting: NDArray[np.bool_]
+    rest: Array
+    load: Array
+    line: list[Array]
 
 
 def at_rest(robot: Robot, parameters: MotorParameters, q: Array, dt: float) -> MotorState:

@@ -63,7 +63,7 @@ class Plant:
 
     @property
     def state(self) -> State:
-        """The input of the control law at the last encoder values; every access computes the contacts."""
+        """The input of the control law at the last encoder values; each access computes the contacts again."""
         contacts = self.model.evaluate(self.q).contacts
         return State(self.robot, self.gains, self.q, self.motion.velocity, self.attractor, contacts, self.force, self.pushes)
 

@@ -49,21 +49,21 @@ NOTHING = 1e-12  # m^2/s: the size of J E J^T for a marker that no motor moves
 class Reach:
     """A reach in progress: its motors, and the state of the default law from tick to tick.
 
-    `motors`: (m,) indices of the motors that are pulled. `seen`: (6,) m, the error, averaged against the encoders' noise. `remaining`: m,
-    the norm of `seen`; `best`: m, the smallest norm so far; `since`: s since then. `escape`: (m,) rad, the last direction out of a singular
-    pose; None: none.
+    `motors`: (m,) indices of the motors on which the reach exerts a force. `seen`: (6,) m, the error, averaged against the encoders' noise.
+    `remaining`: m, the norm of `seen`; `best`: m, the smallest norm so far; `since`: s since then. `escape`: (m,) rad, the last direction
+    out of a singular pose; None: the arm was in no singular pose.
     """
 
     robot: Robot
     gains: Gains
     marker: str
     target: ReachTarget
-    motors: Ints  # (m,) the motors that are pulled
-    seen: Array = field(default_factory=lambda: np.zeros(6))  # m, the error, averaged over the encoders' noise
-    remaining: float = 0.0  # m, its size
-    best: float = math.inf  # m, the smallest size so far
-    since: float = 0.0  # s, the time since then
-    escape: Array | None = None  # (m,) rad, the last direction out of a singular pose
+    motors: Ints
+    seen: Array = field(default_factory=lambda: np.zeros(6))
+    remaining: float = 0.0
+    best: float = math.inf
+    since: float = 0.0
+    escape: Array | None = None
 
     @property
     def is_approaching(self) -> bool:
@@ -91,11 +91,11 @@ class View:
     `drives`: (k, m), motion of these joints for each of the m pulled motors, in the motor's unit of the law.
     """
 
-    error: Array  # (3,) m, from the marker to its goal
-    turn: Array  # (3,) n x n*, the axis about which the normal should turn
-    facing: float  # n . n*
-    columns: Array  # (k, 6) the marker's motion and rotation with each joint from the base to it
-    drives: Array  # (k, m) the motion of these joints with each pulled motor, in the motor's unit
+    error: Array
+    turn: Array
+    facing: float
+    columns: Array
+    drives: Array
 
     @property
     def jacobian(self) -> Array:
@@ -105,7 +105,7 @@ class View:
 
 
 def view(r: Reach, q: Array) -> View:
-    """Return the errors of the marker's position and normal at q (n,) rad, and the derivatives by the joints."""
+    """Return the errors of the marker's position and normal at q (n,) rad, and their derivatives with respect to the joints."""
     frames, target = link_frames(r.robot, q), r.target
     place, normal = marker_at(r.robot, frames, r.marker)
     error = target.position - place

@@ -26,7 +26,7 @@ class LinkSolid:
     """A coloured volume or mesh that is drawn on a link.
 
     `link`: number of the link. `part`: name of the part that moves it. `solid`: in the root frame at the zero pose. `collides`: whether it
-    is one of the robot's solids; otherwise it is only drawn.
+    is one of the robot's solids, which have contacts; otherwise it is only drawn.
     """
 
     link: int
@@ -69,7 +69,7 @@ def link_solids(robot: Robot) -> tuple[LinkSolid, ...]:
 def coarser(solids: Sequence[LinkSolid], budget: int) -> list[LinkSolid]:
     """Return the solids with simplified meshes that together have at most about `budget` triangles.
 
-    It is for viewers without a graphics card.
+    Viewers without a graphics card need fewer triangles.
     """
     meshes = {id(one.solid.mesh): one.solid.mesh for one in solids if one.solid.mesh is not None}
     counts = [len(one.solid.mesh.triangles) for one in solids if one.solid.mesh is not None]

@@ -25,7 +25,7 @@ REST_SPEED = 0.002  # m/s: a pause counts as motion at this speed, so that it ge
 class Motion:
     """A sequence of T poses.
 
-    `times`: (T,) s. `objects`: the objects of the world at each pose, by name.
+    `poses`: the T poses, at `times` (T,) s. `objects`: for each pose, the objects of the world by name.
     """
 
     poses: tuple[Pose, ...]
@@ -56,7 +56,7 @@ class Motion:
         return tuple(name for name, part in self.poses[0].robot.parts.items() if moves[part.slice].any())
 
     def moments(self, marker: str, count: int) -> Ints:
-        """Return the numbers of up to `count` poses, the first and the last included, between which the marker moves equal distances.
+        """Return the indices of up to `count` poses, the first and the last included, between which the marker moves equal distances.
 
         They are the poses to draw in a filmstrip.
         """

@@ -57,9 +57,10 @@ def faded(color: Color, share: float) -> Color:
 
 
 def of_object(kind: str, role: str, given: Sequence[float] | None = None) -> Rgba:
-    """Return the colour of a world object as bytes red, green, blue, opacity.
+    """Return the colour of a world object: red, green, blue and opacity, each 0 to 255.
 
-    `given`: red, green, blue, opacity, 0 to 1; None: the colour follows from role and kind.
+    `kind`: kind of its volume, such as "box". `role`: "obstacle", "target" or "ghost". `given`: red, green, blue and opacity, each 0 to 1;
+    None: the colour of the role and kind.
     """
     if given is not None:
         red, green, blue, opacity = (round(255 * channel) for channel in given)

@@ -29,7 +29,7 @@ HOLLOW, HOLLOW_WIDTH, HOLLOW_DEPTH = 0.35, 0.02, 0.06  # how dark it is behind s
 
 
 def draw(solids: Sequence[Solid], camera: Camera, floor: float | None = None, rays: int = RAYS, ground: Color = WHITE) -> Picture:
-    """Draw solids as a parallel camera sees them; return the picture (height, width, 3), bytes red, green, blue.
+    """Draw solids as a camera with parallel rays sees them; return the picture (height, width, 3), bytes red, green, blue.
 
     `floor`: height of the floor on which shadows fall [m]; None: no floor. `rays`: each pixel is the mean of `rays` x `rays` rays.
     `ground`: the colour behind all solids, 8-bit red, green, blue.

@@ -24,7 +24,7 @@ def room(seed: int, colors: Sequence[Color] = (RED,)) -> list[Solid]:
     """Return the solids of a room: walls with pictures on them, and things near the walls, out of the robot's reach.
 
     A quarter of the pictures and things have one of `colors` (red, green, blue, 0 to 1), the colours of the objects that are searched.
-    `seed`: of the random choices.
+    `seed`: seed of the random choices.
     """
     rng = np.random.default_rng([seed, _STREAM])
     low, high = FLOOR, CEILING
@@ -50,7 +50,7 @@ def room(seed: int, colors: Sequence[Color] = (RED,)) -> list[Solid]:
 def clutter(objects: Iterable[WorldObject], seed: int, colors: Sequence[Color] = (RED,)) -> list[Solid]:
     """Return sheets and discs of paper that lie flat on the boxes among the world's `objects`, so that no hand collides with them.
 
-    A quarter of them have one of `colors` (red, green, blue, 0 to 1). `seed`: of the random choices.
+    A quarter of them have one of `colors` (red, green, blue, 0 to 1). `seed`: seed of the random choices.
     """
     rng = np.random.default_rng([seed, _STREAM, 1])
     solids = []

@@ -104,7 +104,7 @@ class Scene:
 
     @property
     def transforms(self) -> Array:
-        """The present transforms of all links, (L, 4, 4), from link frames at the zero pose to the root frame."""
+        """The present transforms of all links, (L, 4, 4), which map a point's position at zero pose to its present one, root frame."""
         return self._transforms
 
     def draw(self, name: str) -> Picture:
@@ -116,9 +116,10 @@ class Scene:
         return picture.reshape(height, width, 3)
 
     def light(self, view: View, hidden: frozenset[int], pixels: Pixels, brightness: Floats) -> None:
-        """Add the brightness of K pixels of a view to `brightness` (K, 3), which is changed: red, green and blue, 0 to 255.
+        """Draw K pixels of a view: add what they show to `brightness` (K, 3), in place: red, green and blue, 0 to 255.
 
-        `hidden`: numbers of links that are not drawn, such as the link of the camera. `pixels`: the K pixels.
+        `view`: place, axes and field of view of the camera. `hidden`: indices of links that are not drawn, such as the link of the camera.
+        `pixels`: the K pixels.
         """
         shown = self._packed(hidden)
         packs = shown.at(self._transforms, self._objects)
@@ -126,9 +127,10 @@ class Scene:
         shade(which, normal, pixels.rays, shown.colors, LAMP, brightness)
 
     def objects_at(self, view: View, hidden: frozenset[int], pixels: Pixels) -> Ints:
-        """Return the number of the world object that each of K pixels of a view shows, (K,); -1: no object.
+        """Return the index of the world object that each of K pixels of a view shows, (K,); -1: no object.
 
-        Objects are numbered in the order of the world. `hidden`: numbers of links that are not drawn. `pixels`: the K pixels.
+        Objects are numbered in the order of the world. `view`: place, axes and field of view of the camera. `hidden`: indices of links that
+        are not drawn. `pixels`: the K pixels.
         """
         shown = self._packed(hidden)
         packs = shown.at(self._transforms, self._objects)

@@ -128,7 +128,7 @@ def marker_cloud(
         model: the robot in its world.
         q: (P, n) rad.
         markers: names.
-        path: of the file.
+        path: path of the file.
         shown: (n,) rad, pose of the robot in the picture; None: home.
         views: names of `camera.VIEWS`, or (azimuth, elevation) in degrees; a picture for each.
         values: (P,), which give the points' colours, blue for the smallest, orange for the largest; None: the height of each point.
@@ -155,7 +155,7 @@ def marker_cloud(
 def cloud_solids(pose: Pose, places: Array, values: Array) -> list[Solid]:
     """Return the solids of a picture: the robot in a pose, the world around it, and points `places` (P, 3) m as small balls.
 
-    `values`: (P,), which give the points' colours, blue for the smallest, orange for the largest.
+    `values`: (P,), a number for each point, which determines its colour: blue for the smallest, orange for the largest number.
     """
     low, high = float(values.min()), float(values.max())
     shares = (values - low) / (high - low) if high > low else np.full(len(values), 0.5)

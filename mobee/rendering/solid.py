@@ -36,7 +36,8 @@ class Solid:
 
     Attributes:
         kind: "sphere", "box", "cylinder", "capsule", "convex" or "mesh".
-        size: m, lengths of the kind, as of a robot's Shape.
+        size: m, lengths of the kind: sphere (radius,); capsule and cylinder (radius, height); box (x, y, z), full edges; convex and mesh
+            ().
         position: (3,) m, root frame.
         rotation: (3, 3), root frame.
         color: red, green, blue, 0 to 1.
@@ -89,8 +90,8 @@ def ball(position: Array, radius: float, color: Color, veiled: float = 0.0, grou
 def tube(points: Array, radius: float, colors: Sequence[Color], veiled: float = 0.0, group: int = 0) -> list[Solid]:
     """Return a tube of capsules along the line through points (P, 3) m, root frame, with a radius [m].
 
-    `colors`: of the P - 1 pieces. `veiled`: share of the colour that shows through volumes in front of it. `group`: solids of the same
-    group have no outline between them.
+    `colors`: colours of the P - 1 pieces. `veiled`: share of the colour that shows through volumes in front of it. `group`: solids of the
+    same group have no outline between them.
     """
     pieces = []
     for start, end, color in zip(points[:-1], points[1:], colors, strict=True):
@@ -122,7 +123,7 @@ def trail_solids(points: Array, group: int = TRAIL_GROUP) -> list[Solid]:
 
 
 def focus(solids: Sequence[Solid]) -> list[Solid]:
-    """Return the solids that must lie inside a picture's frame: all except world objects that are not targets."""
+    """Return the solids that must lie inside a picture's frame: all solids except those of world objects that are not targets."""
     return [solid for solid in solids if not solid.aside]
 
 
@@ -136,8 +137,9 @@ def lowest(solids: Sequence[Solid]) -> float:
 class Packed:
     """Solids in the form that the compiled core reads.
 
-    `volumes`: (N,) table CONVEX of the volumes. `surfaces`: (M,) table SURFACE of the meshes. `numbers`: N + M indices of these in the
-    given list of solids, volumes first. `kept`: arrays to which the tables point; they must exist as long as the tables.
+    `volumes`: (N,) table CONVEX of the volumes. `surfaces`: (M,) table SURFACE of the meshes. `numbers`: for each of these N + M volumes
+    and meshes, volumes first, its index in the list of solids that was packed. `kept`: arrays to which the tables point; they must exist as
+    long as the tables.
     """
 
     volumes: NDArray[np.void]

@@ -84,7 +84,10 @@ def _digest(parts: Iterable[bytes]) -> str:
 def world_as_json(world: World) -> list[dict[str, Any]]:
     """Return the objects of a world as plain JSON values, in the order in which they were added.
 
-    Each object is a dict with the keys name, kind, size, position, rotation, role, color and link.
+    Each object is a dict: "name"; "kind" and "size" (list of lengths in m) of its shape, as in `mobee.model.world_object.Geometry`;
+    "position" (3 numbers, m) and "rotation" (3 rows of 3 numbers), in the root frame, or in the frame of the link that carries the object;
+    "role": "obstacle", "target" or "ghost"; "color": red, green, blue and opacity, each 0 to 1, or None; "link": name of the link that
+    carries the object, or None. Mass and friction are not included.
     """
     return [
         {

@@ -59,7 +59,17 @@ def check_edges(
 def checked(
     model: Model, q: Array, edges: Ints, step: float = STEP, marker: str | None = None, threads: int = 1, reaching: Reaching = None
 ) -> Checked:
-    """Return whether each edge is free of contacts, and the number of poses checked; arguments as in `check_edges`."""
+    """Check which edges between poses are free of contacts between solids, as `check_edges` does; return also the number of poses checked.
+
+    Args:
+        model: its solid shapes are checked, in the present state of its world.
+        q: (V, n) rad, poses of all motors.
+        edges: (E, 2) numbers of the two poses of each edge.
+        step: largest straight distance that the marker moves between successive poses [m].
+        marker: name of the marker; None: the shape of the robot that moves farthest.
+        threads: number of threads; the result does not depend on it.
+        reaching: a marker, or up to two, whose hands may touch targets: these contacts are ignored.
+    """
     if not step > 0.0:
         raise InvalidValue(f"step {step} m: it must be above 0.")
     checked_threads(threads)

@@ -58,7 +58,10 @@ def nearest_before(y: Array, spacing: ArrayLike, count: int) -> Ints:
 
 
 def short(q: Array, edges: Ints, longest: float | None) -> Ints:
-    """Return the edges, of `edges` (E, 2) between poses q (V, n) rad, on which no motor turns by more than `longest` [rad]; None: all."""
+    """Return those of the edges (E, 2) between poses q (V, n) rad on which no motor turns by more than `longest` [rad].
+
+    `longest` None: all edges are returned.
+    """
     if longest is None:
         return edges
     steps = np.abs(q[edges[:, 0]] - q[edges[:, 1]]).max(axis=1, initial=0.0)
@@ -84,7 +87,7 @@ class Graph:
     q: Array
     neighbours: list[list[int]]
     lengths: list[list[float]]
-    components: Ints  # (V,) number of each vertex's connected part, 0 for the largest one
+    components: Ints
 
     def shortest(self, start: int, goal: int, without: Set[tuple[int, int]] = frozenset()) -> list[int] | None:
         """Return the vertices of the shortest path from `start` to `goal`, both included; None if there is no path.

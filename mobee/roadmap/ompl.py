@@ -303,10 +303,20 @@ def prm_star(
     seed: int = 0,
     step: float = STEP,
 ) -> Grown:
-    """Grow a roadmap with PRM*, whose number of neighbours makes paths asymptotically optimal (Karaman and Frazzoli 2011).
+    """Grow a roadmap of poses and motions without solid contacts with PRM* (Karaman and Frazzoli 2011).
 
-    The arguments are those of `prm`: `milestones`: least number of poses; `rest`: (n,) rad, positions of the motors that do not move, None:
-    home; `step`: fraction of each motor's range between checked poses.
+    The number of neighbours that PRM* chooses makes paths asymptotically optimal.
+
+    Args:
+        model: robot and world.
+        motors: names of motors or parts that move; None: all.
+        milestones: least number of poses.
+        rest: (n,) rad, positions of the other motors; None: the home posture.
+        seed: of the samples.
+        step: fraction of each motor's range between the checked poses of a motion.
+
+    Raises:
+        OmplMissing, InvalidValue, UnknownName: OMPL is not installed, or an argument is invalid; the message states the remedy.
     """
     return _grown("PRMstar", model, motors, milestones, None, rest, seed, step)
 

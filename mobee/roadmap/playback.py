@@ -176,7 +176,8 @@ class Played:
     """The motion of a robot along a path, one row for each of T ticks.
 
     `times`: (T,) s. `wanted`, `q`: (T, n) rad, planned and real positions. `solid`, `field`: (T,) m, depth of the deepest contact of solids
-    and of fields. `rested`: whether the robot came to rest. `deepest`: the solid contacts of the pose in which `solid` was largest.
+    and of fields (larger shapes around solids that cause repulsive forces), 0 without a contact. `rested`: whether the robot came to rest.
+    `deepest`: the solid contacts of the pose in which `solid` was largest.
     """
 
     times: Array
@@ -303,7 +304,8 @@ def attractors(robot: Robot, wanted: Reference, gains: Gains, forces: Callable[[
         robot: the robot.
         wanted: the planned motion.
         gains: of the control law.
-        forces: the law's other forces (n,) rad/s^2 at a posture (n,) rad, which the spring also balances; None: there are no other forces.
+        forces: function that takes a posture (n,) rad and returns the forces (n,) rad/s^2 of the control law except spring and damping. The
+            attractor is shifted such that its spring cancels these forces; None: they are not cancelled.
     """
     damping = gains.of_robot("damping", robot)
     held = np.arange(0.0, wanted.times[-1] + PERIOD, PERIOD) + 0.5 * PERIOD  # each is in force for a period: meant for its middle

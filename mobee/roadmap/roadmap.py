@@ -82,7 +82,8 @@ class Roadmap:
     def vertex_path(self, q_from: ArrayLike, y_goal: ArrayLike, free: bool = False) -> list[int]:
         """Return the numbers of the vertices on the shortest path from a posture (n,) rad to the vertex nearest to `y_goal` (m,).
 
-        `free`: return only a path without contacts in the present world. The errors are those of `path`.
+        `free`: return only a path without contacts in the present world. Raises InvalidValue if the map is empty or has no vertex near the
+        goal, and MobeeError if start and goal are in unconnected parts of the map or every path has contacts.
         """
         if free:
             return free_path(self.model, self.graph, self.edges, self._posture(q_from), self._from(q_from), self._to(y_goal))
@@ -200,7 +201,10 @@ def load_roadmap(path: str | Path, model: Model | None = None, robot: Robot | No
 
 
 def digests(model: Model) -> dict[str, str]:
-    """Return the settings that identify a roadmap's robot and world: name of the robot, "robot_digest" and "world_digest"."""
+    """Return the settings that identify a roadmap's robot and world, as a dict of texts.
+
+    Keys: "robot", the name of the robot; "robot_digest" and "world_digest", hex digits that change if robot or world change.
+    """
     return {
         "robot": model.robot.name,
         "robot_digest": robot_digest(model.robot),

@@ -47,13 +47,13 @@ def ball_of_water(mass: float) -> Array:
 
 
 def from_six(values: Iterable[float]) -> Array:
-    """Return the inertia tensor (3, 3) of which the six values are ixx, ixy, ixz, iyy, iyz, izz, in this order."""
+    """Return the inertia tensor (3, 3) with the components ixx, ixy, ixz, iyy, iyz and izz, which `values` has in this order."""
     xx, xy, xz, yy, yz, zz = values
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 def to_six(inertia: Array) -> list[float]:
-    """Return the six values ixx, ixy, ixz, iyy, iyz, izz of an inertia tensor (3, 3)."""
+    """Return the components ixx, ixy, ixz, iyy, iyz and izz of an inertia tensor (3, 3), in this order."""
     return [float(inertia[i, j]) for i, j in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))]
 
 

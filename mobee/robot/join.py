@@ -24,13 +24,14 @@ SEPARATOR = "_"  # part names are in keys of the bus: a-z, 0-9 and _ only
 class Placed:
     """A robot to be joined with others.
 
-    `prefix`: prefix of its names in the joined robot; "": none. `position`, `rotation`: pose of its root frame in the common root frame.
+    `prefix`: text before its names in the joined robot; "": none. `position` (3,) m, `rotation` (3, 3): of its root frame in the common
+    root frame.
     """
 
     prefix: str
     robot: Robot
-    position: Array = field(default_factory=lambda: np.zeros(3))  # (3,) m
-    rotation: Array = field(default_factory=lambda: np.eye(3))  # (3, 3)
+    position: Array = field(default_factory=lambda: np.zeros(3))
+    rotation: Array = field(default_factory=lambda: np.eye(3))
 
     def name(self, own: str) -> str:
         """Return the name that a part, motor, joint, link, marker, shape or camera of this robot has in the joined robot.
@@ -45,12 +46,12 @@ def join_robots(
 ) -> Robot:
     """Join several robots into one.
 
-    `robots`: the robots, by key. `places`: by the same keys, position (3,) m and rotation (3, 3) of a robot's root frame in the common
-    root frame; default: the common root frame itself. `name`: of the joined robot; None: the keys with "_" between them.
-    Names of parts, motors, joints, links, markers, shapes and cameras get the key and "_" as a prefix; the key "" leaves them unchanged.
-    Parts and motors are in the order given. The bases become one link, with the name of the first base. Every solid is tested against all
-    solids of the other robots, every field against all their fields; within a robot its own pairs are kept. The joined robot's
-    `least_lever` is the largest of all robots: give all robots the same value if contacts must push each robot as before.
+    `robots`: the robots, by key. `places`: by the same keys, position (3,) m and rotation (3, 3) of a robot's root frame in the common root
+    frame; default: the common root frame itself. `name`: name of the joined robot; None: the keys with "_" between them. Names of parts,
+    motors, joints, links, markers, shapes and cameras get the key and "_" as a prefix; the key "" leaves them unchanged. Parts and motors
+    are in the order given. The bases become one link, with the name of the first base. Every solid is tested against all solids of the
+    other robots, every field (volume that causes a repulsive force) against all their fields; within a robot its own pairs are kept. The
+    joined robot's `least_lever` is the largest of all robots: give all robots the same value if contacts must push each robot as before.
     Raises InvalidValue for equal names, for no robots and for a place that is not a pose; UnknownName for a place without a robot.
     """
     for key in places or {}:

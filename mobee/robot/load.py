@@ -34,12 +34,13 @@ def load_robot(
 
     Args:
         name_or_path: a shipped name, the path of a file, or with the package mujoco-menagerie a name of MuJoCo Menagerie.
-        field: URDF and MJCF: distance [m] by which fields extend beyond the solids, one field for every solid; None: no fields.
+        field: URDF and MJCF: distance [m] by which fields extend beyond the solids, one field for every solid; a field is a volume that
+            causes a repulsive force; None: no fields.
         meshes: URDF and MJCF: "hull" (the default): a mesh becomes its convex hull; "bounding": the smallest primitive around it.
         corners: URDF and MJCF: the largest number of corners of a mesh's hull (64 by default), or "all" for the exact hull.
         srdf: URDF only: the SRDF file; None: an SRDF beside the URDF or in ../srdf, if there is one (docs/robots.md).
-        home: URDF and MJCF: the home pose: the name of a <group_state> of the SRDF or of a keyframe of the MJCF, or "zero"; None: the
-            pose that docs/robots.md describes.
+        home: URDF and MJCF: the home pose: the name of a <group_state> of the SRDF or of a keyframe of the MJCF, or "zero"; None: the pose
+            that docs/robots.md describes.
 
     Raises:
         UnknownName: no shipped robot has the name; the message gives the nearest name.
@@ -73,8 +74,8 @@ def shipped_robots() -> tuple[str, ...]:
 def find_file(name_or_path: str | Path, folder: Path, kind: str) -> Path:
     """Return the path of a robot or world file, which is given as a path or as a shipped name.
 
-    `folder`: of the shipped files. `kind`: "robot" or another word for the messages; for a robot, names of MuJoCo Menagerie are valid
-    too. Raises InvalidValue, UnknownName or RobotFileError if there is no such file.
+    `folder`: folder of the shipped files. `kind`: "robot" or another word for the messages; for a robot, names of MuJoCo Menagerie are
+    valid too. Raises InvalidValue, UnknownName or RobotFileError if there is no such file.
     """
     if not isinstance(name_or_path, str | Path):
         raise InvalidValue(f"{kind} is {name_or_path!r}; it must be a path, or a name: {', '.join(shipped(folder))}.")

@@ -76,7 +76,7 @@ def limit_zones(robot: Robot, width: Array) -> Array:
 
 
 def outside_zones(wanted: float, limits: Array, unit: float) -> float:
-    """Return the position nearest to `wanted` that is outside the limit zones of the shipped gains.
+    """Return the position nearest to `wanted` outside the limit zones, in which the control law with the default gains pushes inward.
 
     `wanted`, `limits` (2,) and the result are in the motor's own unit, rad or m. `unit`: the motion of the motor that counts as 1 rad.
     """

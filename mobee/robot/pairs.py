@@ -30,7 +30,7 @@ MAX_NAMED = 4  # joints of a cluster that a reason lists
 
 
 def joined_links(joints: Sequence[Joint]) -> dict[LinkPair, str]:
-    """Return the excluded pairs of links that meet in one cluster of joints, each with the reason as text.
+    """Return the pairs of links that meet in one cluster of joints and so are not tested for contacts, each with the reason as text.
 
     A cluster is a group of joints of which each is within CLUSTER (5 cm) of its parent joint or of a joint on the same link.
     """
@@ -65,9 +65,10 @@ def _clusters(joints: Sequence[Joint]) -> list[list[int]]:
 
 
 def hand_links(subtree: Sequence[int], names: Mapping[int, str]) -> dict[LinkPair, str]:
-    """Return the excluded pairs of links inside one noSelfCollision subtree (a hand), each with the reason as text.
+    """Return the pairs of links inside one noSelfCollision subtree (a hand), which are not tested for contacts, each with the reason.
 
-    `subtree`: for each link the number of its subtree, -1 if none; `names`: the name of each subtree for the reason.
+    The attribute noSelfCollision of an element in a robot file applies to all links below it. `subtree`: for each link the number of its
+    subtree, -1 if none. `names`: the name of each subtree, for the reason.
     """
     members: dict[int, list[int]] = {}
     for link, start in enumerate(subtree):
@@ -83,7 +84,8 @@ def hand_links(subtree: Sequence[int], names: Mapping[int, str]) -> dict[LinkPai
 def tested_pairs(shapes: Sequence[Shape], role: str, untested: Collection[LinkPair], own: bool = False) -> Ints:
     """Return the pairs of shapes of one role ("solid" or "field") that are tested for contacts, (p, 2), indices into `shapes`.
 
-    `untested`: pairs of links that are excluded; `own`: whether fields of one part are tested against each other too.
+    `untested`: pairs of links that are excluded from the tests. `own`: whether fields (volumes that cause repulsive forces) of one part are
+    tested against each other too; solids of one part always are.
     """
     chosen = np.array([index for index, shape in enumerate(shapes) if shape.role == role], dtype=np.intp)
     link = np.array([shapes[index].link for index in chosen], dtype=np.intp)
@@ -107,15 +109,16 @@ def link_pairs(shapes: Sequence[Shape], *pairs: Ints) -> set[LinkPair]:
 
 
 def merged(*rules: Mapping[LinkPair, str]) -> dict[LinkPair, str]:
-    """Merge several tables of excluded pairs of links: return all their pairs, each with the reason of the first table that has it."""
+    """Merge several tables of untested pairs of links; return all pairs, each with the reason of the first table that has the pair."""
     return {pair: reason for rule in reversed(rules) for pair, reason in rule.items()}
 
 
 def joined_pairs(bodies: Sequence[Robot], starts: Sequence[int], role: str) -> Ints:
     """Return the tested pairs of shapes of one role ("solid" or "field") of several joined robots, (p, 2), sorted.
 
-    They are each robot's own pairs, and all pairs of shapes of two robots, unless both shapes are on the common base. `bodies`: the
-    robots, with the links of the joined robot. `starts`: for each robot, the index of its first shape in the joined robot.
+    A field is a volume that causes a repulsive force. The result has the tested pairs of each robot itself, and all pairs of shapes of two
+    different robots, unless both shapes are on the common base. `bodies`: the robots; their links have the indices of the joined robot.
+    `starts`: for each robot, the index of its first shape in the joined robot.
     """
     pairs = [
         (body.solid_pairs if role == "solid" else body.field_pairs).reshape(-1, 2) + start
@@ -135,10 +138,11 @@ def joined_pairs(bodies: Sequence[Robot], starts: Sequence[int], role: str) -> I
 
 
 def joined_untested(bodies: Sequence[Robot], shapes: Sequence[Shape], pairs: Sequence[Ints]) -> dict[LinkPair, str]:
-    """Return the excluded pairs of links of several joined robots, each with the reason, without pairs that are tested after all.
+    """Return the pairs of links of several joined robots that are never tested for contacts, each with the reason.
 
-    `bodies`: the robots, with the links of the joined robot. `shapes`: of the joined robot. `pairs`: its tested pairs of solids and of
-    fields, each (p, 2). A pair with the common base can be excluded in one robot and tested in another.
+    They are the untested pairs of the single robots, except those that are tested in the joined robot: a pair with the common base can be
+    untested in one robot and tested in another. `bodies`: the robots; their links have the indices of the joined robot. `shapes`: shapes of
+    the joined robot. `pairs`: its tested pairs of solids and of fields, each (p, 2).
     """
     tested = link_pairs(shapes, *pairs)
     return merged(*({pair: reason for pair, reason in body.untested.items() if pair not in tested} for body in bodies))

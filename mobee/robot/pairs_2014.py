@@ -30,10 +30,11 @@ Rule = Literal["published_2014", "recorded_2014"]
 
 @dataclass(frozen=True, slots=True)
 class Element:
-    """A <link> or <joint> element of a file.
+    """A <link> or <joint> element of a robot file.
 
     `parent`: index of the element that carries it, -1: none. `tag`: "link" or "joint". `part`: name of its part. `subtree`: index of the
-    element whose noSelfCollision includes it, -1: none. `link`: index of its link in the robot.
+    element above it with the attribute noSelfCollision, so that shapes below it are not tested against each other; -1: none. `link`: index
+    of its link in the robot.
     """
 
     parent: int
@@ -46,7 +47,8 @@ class Element:
 def published_pairs(elements: Sequence[Element], hosts: Sequence[int], shapes: Sequence[Shape], role: str, rule: Rule) -> Ints:
     """Return the pairs of shapes of one role ("solid" or "field") that a rule of 2014 tests for contacts, (p, 2), indices in `shapes`.
 
-    `hosts`: for each shape the index of its element. `rule`: "published_2014" (the program's) or "recorded_2014" (an earlier reading).
+    A field is a volume that causes a repulsive force. `hosts`: for each shape the index of its element. `rule`: "published_2014": the rule
+    of the program published in 2014; "recorded_2014": this project's earlier interpretation of that rule.
     """
     chosen = [index for index, shape in enumerate(shapes) if shape.role == role]
     near = _near(elements, hosts, shapes, role, rule)
@@ -57,8 +59,9 @@ def published_pairs(elements: Sequence[Element], hosts: Sequence[int], shapes: S
 def published_untested(elements: Sequence[Element], hosts: Sequence[int], shapes: Sequence[Shape], rule: Rule) -> dict[LinkPair, str]:
     """Return the pairs of links that a rule of 2014 never tests for contacts, each with the reason.
 
-    A pair of links is never tested if the rule for solids excludes all pairs of their elements. Of a link, the elements that have a solid
-    count; if no element has a solid, all elements count. `hosts`: for each shape the index of its element.
+    A pair of links is never tested if the rule for solids excludes all pairs of their elements. Only elements of a link that have a solid
+    count; if none has a solid, all elements of the link count. `hosts`: for each shape the index of its element. `rule`: "published_2014":
+    the rule of the program published in 2014; "recorded_2014": this project's earlier interpretation of that rule.
     """
     solid = _bearing(hosts, shapes, "solid")
     near = _near(elements, hosts, shapes, "solid", rule)
@@ -174,8 +177,8 @@ def near_root(parents: Sequence[int], tags: Sequence[str], index: int) -> bool:
     """Return whether an element counts as the base in the program of 2014 (KinTreeNode::isNearRoot), so that the world does not touch it.
 
     A search climbs from the element over one change from link to joint and one change from joint to link, and then over elements with the
-    same tag as the first element. An element is near the root if this search arrives at the root. `parents`: for each element the index
-    of its parent, -1 if that is the root. `tags`: for each element "link" or "joint". `index`: of the element.
+    same tag as the first element. An element is near the root if this search arrives at the root. `parents`: for each element the index of
+    its parent, -1 if that is the root. `tags`: for each element "link" or "joint". `index`: index of the element.
     """
     here, link, joint = index, False, False
     while parents[here] >= 0:

@@ -32,9 +32,9 @@ class Joint:
     name: str
     parent: int
     kind: Literal["revolute", "prismatic"]
-    axis: Array  # (3,) unit vector, root frame, zero pose
-    point: Array  # (3,) m, a point on the axis, root frame, zero pose
-    limits: Array  # (2,) rad (revolute) or m (prismatic)
+    axis: Array
+    point: Array
+    limits: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,12 +50,12 @@ class Motor:
 
     name: str
     part: str
-    limits: Array  # (2,) rad
-    home: float  # rad
-    joints: tuple[tuple[int, float, float], ...]  # (joint index, scale, offset in the joint's unit)
-    max_velocity: float = np.deg2rad(60.0)  # rad/s, enforced by the safety gate
-    max_acceleration: float = np.deg2rad(600.0)  # rad/s^2
-    max_torque: float = 40.0  # N m
+    limits: Array
+    home: float
+    joints: tuple[tuple[int, float, float], ...]
+    max_velocity: float = np.deg2rad(60.0)
+    max_acceleration: float = np.deg2rad(600.0)
+    max_torque: float = 40.0
     zone_ends_at_home: bool = False
 
 
@@ -93,11 +93,11 @@ class Shape:
     link: int
     kind: ShapeKind
     size: tuple[float, ...]
-    position: Array  # (3,) m
-    rotation: Array  # (3, 3)
+    position: Array
+    rotation: Array
     role: Literal["solid", "field"]
     part: str
-    vertices: Array | None = None  # (v, 3) m about `position`, in the shape's own axes; convex only
+    vertices: Array | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,9 +109,9 @@ class Marker:
 
     name: str
     link: int
-    position: Array  # (3,) m
-    rotation: Array  # (3, 3)
-    normal: Array  # (3,) unit vector
+    position: Array
+    rotation: Array
+    normal: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,9 +123,9 @@ class Body:
     """
 
     link: int
-    mass: float  # kg
-    centre: Array  # (3,) m, centre of mass
-    inertia: Array | None = None  # (3, 3) kg m^2 about the centre, along the root frame's axes; None where it is unknown
+    mass: float
+    centre: Array
+    inertia: Array | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -137,8 +137,8 @@ class Clause:
     """
 
     part: str
-    a: Array  # (rows, n)
-    b: Array  # (rows,) rad
+    a: Array
+    b: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +152,7 @@ class Robot:
         motor_table: the motors, in the order of q.
         parts: the parts by name. `part(name)` returns one, or raises UnknownName with the nearest name.
         markers: the markers by name. `marker(name)` returns one, or raises UnknownName with the nearest name.
-        shapes: solids and fields of all links.
+        shapes: solids and fields of all links; a field is a volume that causes a repulsive force.
         clauses: conditions on motor positions, all of which should hold.
         field_pairs, solid_pairs: (p, 2) indices into `shapes`: the pairs of fields, and of solids, that are tested for contacts.
         base_shapes: indices of shapes that are never tested against world objects, since the robot stands on world objects.
@@ -160,7 +160,7 @@ class Robot:
         where: file and line of every element, as {("joint", name): "file:line"}.
         bodies: the masses, at most one for each link, in the order of the links; () if the file has none.
         visuals: the drawn surfaces of the links, if these are not their solids.
-        cameras: the cameras in the robot's file, by name; `mobee.robot.cameras.cameras_of` chooses those that make pictures.
+        cameras: the cameras in the robot's file, by name; `mobee.robot.cameras.cameras_of` chooses which ones make pictures.
         least_lever: m. 0: a contact of fields pushes the motors by J^T (thesis eq. 5.11), so a contact with a short lever hardly pushes.
             Above 0: it pushes by LEVER^2 J^T / (|J|^2 + least_lever^2), with LEVER = 0.5 m and |J| the lever of the contact
             (`mobee.model.levers`).

@@ -17,9 +17,9 @@ Channels = tuple[float, float, float, float]  # red, green, blue, opacity in 0..
 class MeshSource:
     """The file of a mesh, as a robot's file names it.
 
-    `file`: the name of the mesh's file, a path relative to the robot's file or an address file:// or package://. `name`: of one mesh in a
-    file with several meshes (MJCF). `robot_file`, `line`: where the robot's file names the mesh. `scale`: factors (x, y, z) by which the
-    lengths in the mesh's file are multiplied.
+    `file`: the name of the mesh's file, a path relative to the robot's file or an address file:// or package://. `name`: name of one mesh
+    in a file with several meshes (MJCF). `robot_file`, `line`: where the robot's file names the mesh. `scale`: factors (x, y, z) by which
+    the lengths in the mesh's file are multiplied.
     """
 
     file: str
@@ -33,16 +33,17 @@ class MeshSource:
 class Visual:
     """A volume or a mesh that is drawn on a link and has no contacts.
 
-    `link`: index of the link. `size` in m: as of a `mobee.robot.robot.Shape`; ellipsoid (x, y, z), half axes; mesh (). `position` (3,) m,
-    `rotation` (3, 3): in the root frame, at zero pose. `color`: red, green, blue and opacity, each 0 to 1; None: the robot's file gives no
-    colour, and a mesh is drawn in the colours of its own file. `mesh`: the file of a visual of kind "mesh", else None.
+    `link`: index of the link. `size` in m, as in `mobee.robot.robot.Shape`: sphere (radius,); capsule and cylinder (radius, height); box
+    (x, y, z), full edges; ellipsoid (x, y, z), half axes; mesh (). `position` (3,) m, `rotation` (3, 3): in the root frame, at zero pose.
+    `color`: red, green, blue and opacity, each 0 to 1; None: the robot's file gives no colour, and a mesh is drawn in the colours of its
+    own file. `mesh`: the file of a visual of kind "mesh", else None.
     """
 
     link: int
     kind: VisualKind
     size: tuple[float, ...]
-    position: Array  # (3,) m
-    rotation: Array  # (3, 3)
+    position: Array
+    rotation: Array
     color: Channels | None = None
     mesh: MeshSource | None = None
 
@@ -58,7 +59,7 @@ class Camera:
 
     name: str
     link: int
-    position: Array  # (3,) m
-    rotation: Array  # (3, 3)
+    position: Array
+    rotation: Array
     view_deg: float
     hidden: frozenset[int] = frozenset()

@@ -20,7 +20,7 @@ class Drive:
 
     motor: int
     scale: float
-    offset: float  # rad or m
+    offset: float
 
 
 def drives_of(robot: Robot) -> tuple[Drive, ...]:

@@ -27,7 +27,7 @@ _SETTLED = VERDICTS.index("settled")
 
 
 class Actions:
-    """The state of the action of each part.
+    """The state of the present or last action of each part of a plant.
 
     `parts`: a table with a row for each part (`mobee._core.plant.PART`), which the plant's ticks change.
     """
@@ -92,16 +92,16 @@ if TYPE_CHECKING:
 class Reach:
     """The state of one reach.
 
-    `name`: name of the marker. `stay`: whether the part stays in the pose in which the force ended. `end`, `marker`: outcome and position
-    of the marker (3,) m, root frame, at the end of the force; None while the force acts. `missing`: distance of the marker from the target
-    at the end of the force [m].
+    `name`: name of the marker. `stay`: whether the part stays in the pose in which the force ended. `end`, `marker`: at the end of the
+    force, the outcome and the position of the marker (3,) m, root frame; None while the force acts. `missing`: distance of the marker from
+    the target at the end of the force [m].
     """
 
     name: str
     stay: bool
     end: Outcome | None = None
     marker: Array | None = None
-    missing: float = 0.0  # m
+    missing: float = 0.0
 
 
 class ReachesUnderWay:
@@ -128,7 +128,7 @@ class ReachesUnderWay:
         return tuple(self._under_way)
 
     def present(self, target: ReachTarget | None) -> None:
-        """Add the target to the world, or move it there; None removes the target.
+        """Add the target to the world, or move it if it is in the world already; None removes the target.
 
         Raises InvalidValue if the target is to be removed while a part is reaching for it.
         """
@@ -163,8 +163,8 @@ class ReachesUnderWay:
     def ended(self, part: str, end: Outcome, pose: Pose) -> bool:
         """Record that a part has settled or timed out; return whether the part must now return to its attractor.
 
-        `end`: the outcome. `pose`: the pose at that time. At the end of the force the result is True unless the part stays; at the end of
-        the return it is False.
+        `end`: the outcome. `pose`: the pose of the robot at that time. The first call for a reach ends the force: it returns True, or False
+        if the part stays where it is. The second call ends the return to the attractor: it returns False.
         """
         reach = self._under_way[part]
         if reach.end is None and self._target is not None:

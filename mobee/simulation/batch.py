@@ -49,8 +49,13 @@ def advance_together(plants: Iterable[OfflinePlant], threads: int = 1) -> list[l
 def run_together(plants: Iterable[OfflinePlant], ticks: int, threads: int = 1) -> list[Trace]:
     """Call `run(ticks)` of each plant; return the traces in the order of the plants.
 
-    The results are bit-equal to separate calls, for any number of threads. The errors are those of `advance_together`, but the plants need
-    no action in progress.
+    The results are bit-equal to separate calls, for any number of threads.
+
+    Raises:
+        InvalidValue: before any plant moves, for ticks or threads that are not valid, an object that is no OfflinePlant, a plant listed
+            twice, and plants that share a world while one of them reaches or has a callback (`every`).
+        BatchInterrupted: a plant's state is not finite, or its callback raised an exception; the other plants finish, and the attribute
+            `results` of the exception holds their traces.
     """
     listed = _apart(plants)
     if isinstance(ticks, bool) or not isinstance(ticks, int) or ticks < 0:

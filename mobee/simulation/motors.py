@@ -26,7 +26,7 @@ PerMotor = float | Sequence[float]  # one number for all, or one for each motor 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotorParameters:
-    """Parameters of the simulated motors; the defaults reproduce the published findings.
+    """Parameters of the simulated motors; with the defaults the simulation reproduces the published findings.
 
     lag, delay, backlash and friction are one number, or one for each motor in the order of `robot.motors`. One number for all applies to
     rotary motors; backlash and friction are then scaled by the range of sliding motors (`mobee.robot.motor_units`). Numbers for each motor
@@ -42,12 +42,12 @@ class MotorParameters:
         substep: s, longest time between two steps of the motors.
     """
 
-    lag: PerMotor = 0.05  # s, time constant of the first-order response to a velocity
-    delay: PerMotor = 0.02  # s, before a command begins to act
-    backlash: PerMotor = np.deg2rad(0.2)  # rad, play between motor and joint side
-    friction: PerMotor = 0.0  # rad/s
-    encoder_noise: float = np.deg2rad(0.1)  # rad, standard deviation of the white noise at a tick of 20 ms
-    substep: float = 0.005  # s, at most, between two steps of the motors
+    lag: PerMotor = 0.05
+    delay: PerMotor = 0.02
+    backlash: PerMotor = np.deg2rad(0.2)
+    friction: PerMotor = 0.0
+    encoder_noise: float = np.deg2rad(0.1)
+    substep: float = 0.005
 
     def __post_init__(self) -> None:
         for name in ("lag", "delay", "backlash", "friction", "encoder_noise"):

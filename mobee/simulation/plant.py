@@ -41,20 +41,21 @@ class PlantSettings(Settings):
     """Settings of an `OfflinePlant`.
 
     Args:
-        gains: of the control law; None: `Gains.default()`.
+        gains: gains of the control law; None: `Gains.default()`.
         motors: parameters of the motors; None: `MotorParameters()`, whose defaults reproduce the published findings.
         dt: s, the control tick.
         propagate: which motors a contact force acts on: "tree": those of the whole chain from the touching link to the base; "part": those
             of the touching part only.
-        modality: of the commands: "velocity", "position" or "torque".
+        modality: kind of the commands: "velocity", "position" or "torque".
         speed_scale: share of the motors' largest speed that is used, above 0, at most 1.
-        contact_forces: whether contacts of fields cause forces; False: f_coll is zero.
+        contact_forces: whether contacts of fields, volumes around the solids, cause repulsive forces; False: the law's contact force f_coll
+            is zero.
         active: names or patterns of parts and motors that move; None: all.  The others are rigid at home, without noise, and need no
             computing time.
-        command_age: number of ticks between the reading of the encoders and the start of the motion by the command computed from them; 1 as
-            live.
-        hashed: whether `OfflinePlant.hash` is computed.
-        terms: further forces of the law, Python functions that are called in every tick.
+        command_age: number of ticks between the reading of the encoders and the start of the motion by the command computed from them; the
+            live system has 1.
+        hashed: whether a hash of all encoder values is computed (`OfflinePlant.hash`).
+        terms: further forces of the law, as Python functions, which are called in every tick.
     """
 
     gains: Gains | None = None
@@ -86,7 +87,7 @@ class OfflinePlant:
 
     Args:
         model: the robot in its world.
-        seed: of the encoders' noise, a whole number, at least 0.
+        seed: seed of the encoders' noise, a whole number, at least 0.
         gains: gains of the control law; None: as in `settings`.
         motors: parameters of the motors; None: as in `settings`.
         dt: s, the control tick; None: as in `settings`.
@@ -140,7 +141,7 @@ class OfflinePlant:
         Actions and reaches end without an outcome, and forces that were set are removed. The world and a presented target stay.
 
         Args:
-            seed: of the encoders' noise, a whole number, at least 0.
+            seed: seed of the encoders' noise, a whole number, at least 0.
             q: (n,) rad, start posture within the motors' limits; motors that are not active must be at home.  None: home.
 
         Raises:
@@ -352,8 +353,8 @@ class OfflinePlant:
     def prepare_batch(self, deepest: Array) -> bool:
         """Prepare the plant for a run of a batch in the core; return False if Python must take part in its ticks.
 
-        `deepest`: (2,) m, deepest contacts of solids and of fields; the core raises these numbers, and the caller must keep the array.
-        After each run call `conclude`.
+        `deepest`: (2,) m, depths of the deepest contacts of solids and of fields; the core increases them during the ticks, and the caller
+        must keep the array alive. After each run call `conclude`.
         """
         if self._digest is not None or self._callback is not None or self._reaches.exempt or self._runner.needs_python:
             return False
@@ -374,8 +375,8 @@ class OfflinePlant:
     def conclude(self) -> Array:
         """Update the plant after the core has run ticks; return their record (ticks, 3 n + 2), empty if none was made.
 
-        A row has the encoders, joint positions and velocities (n each), and the deepest contacts of solids and of fields. Raises
-        ActionInterrupted if the motors' state is no longer finite.
+        A row has the encoders, joint positions and velocities (n each), and the depths [m] of the deepest contacts of solids and of fields.
+        Raises ActionInterrupted if the motors' state is no longer finite.
         """
         rows, done, lost = self._runner.results()
         if done:

@@ -25,7 +25,7 @@ class PlantBatch:
     Args:
         model: the robot in its world.
         count: number of plants.
-        settings: of the plants; None: the defaults.
+        settings: settings of all plants; None: the defaults of `PlantSettings`.
         threads: number of threads of the simulation.
     """
 
@@ -47,10 +47,11 @@ class PlantBatch:
         self._core.aim_many(self._addresses[which].tobytes(), len(which), np.ascontiguousarray(attractors).tobytes())
 
     def run(self, which: Ints, ticks: int) -> Array:
-        """Run `ticks` ticks of the plants `which` (k,), also if actions end earlier; return their deepest contacts of solids and fields.
+        """Run `ticks` ticks of the plants `which` (k,), also if actions end earlier; return the depths of their deepest contacts.
 
-        The result is (k, 2) m. Raises BatchInterrupted if a plant's state is not finite; the attribute `results` of the exception then
-        holds the rows of the other plants.
+        The result is (k, 2) m, of contacts of solids and of fields (volumes that cause repulsive forces) during these ticks; 0 without
+        contacts. Raises BatchInterrupted if a plant's state is not finite; the attribute `results` of the exception then holds the rows of
+        the other plants.
         """
         chosen = [self.plants[number] for number in which.tolist()]
         if not all([plant.prepare_batch(self._deepest[number]) for number, plant in zip(which.tolist(), chosen, strict=True)]):

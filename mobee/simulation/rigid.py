@@ -18,7 +18,7 @@ from mobee.robot.robot import Joint, Motor, Robot, per_robot
 
 
 def living(robot: Robot, active: Sequence[str] | None) -> NDArray[np.bool_]:
-    """Return whether each motor is active, (n,); `active`: names or patterns of parts and motors; None: all motors.
+    """Return whether each motor is active, that is, may move, (n,); `active`: names or patterns of parts and motors; None: all.
 
     Raises UnknownName for a pattern that matches nothing, and InvalidValue if no motor is active.
     """
@@ -46,7 +46,7 @@ def stiffened(robot: Robot, alive: NDArray[np.bool_], keep_parts: bool = False, 
         robot: the robot.
         alive: (n,) whether each motor is active.
         keep_parts: whether links of different parts are not merged, so that forces can be cut between parts.
-        solids: False: only fields are kept, since solids exert no forces.
+        solids: whether solids are kept; False: only fields, the volumes that cause repulsive forces, are kept.
         apart: numbers of further links that are not merged.
     """
     known, key = _known(robot), (alive.tobytes(), keep_parts, solids, tuple(apart))

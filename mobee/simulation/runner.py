@@ -53,14 +53,14 @@ class Trace:
         q: (ticks, n) rad, positions of the joints.
         velocity: (ticks, n) rad/s, the velocities that the controller integrates.
         solid: (ticks,) m, depth of the deepest contact of solids at the pose of the encoders; 0 without contacts.
-        field: (ticks,) m, depth of the deepest contact of fields.
+        field: (ticks,) m, depth of the deepest contact of fields, volumes that cause repulsive forces; 0 without contacts.
     """
 
-    encoders: Array  # (ticks, n) rad
-    q: Array  # (ticks, n) rad, joint sides
-    velocity: Array  # (ticks, n) rad/s, the controller's own
-    solid: Array  # (ticks,) m, the deepest contact of solids at the encoders' pose, 0 without any
-    field: Array  # (ticks,) m, of fields
+    encoders: Array
+    q: Array
+    velocity: Array
+    solid: Array
+    field: Array
 
     @classmethod
     def of(cls, record: Array) -> Trace:
@@ -168,7 +168,8 @@ class Runner:
     def prepare_batch(self, deepest: Array) -> None:
         """Prepare successive runs of a batch in the present world, without Python between the ticks.
 
-        `deepest`: (2,) m, deepest contacts of solids and of fields; the core raises these numbers, and the caller must keep the array.
+        `deepest`: (2,) m, depths of the deepest contacts of solids and of fields; the core increases them during the ticks, and the caller
+        must keep the array alive.
         """
         world = self._controller.model.world.snapshot
         if self.batch_world is not world:

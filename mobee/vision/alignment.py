@@ -25,7 +25,7 @@ def aligned(gray: NDArray[np.float32], lens: Lens, pattern: Array, margin: int, 
 
     Args:
         gray: (height, width), the picture.
-        lens: of the camera.
+        lens: lens of the camera.
         pattern: (c, c), the brightness of square cells.
         margin: number of cells of `pattern` around the square whose corners are searched.
         corners: (4, 2) px, first values of the corners, column and row, clockwise from the upper left.

@@ -34,9 +34,9 @@ class Sighting:
     share of the outline that is visible, 0 to 1.
     """
 
-    direction: Array  # (3,) unit vector to the ball's centre
-    half_angle: float  # rad, of the cone that touches the ball
-    arc: float  # share of the outline that is visible, 0..1
+    direction: Array
+    half_angle: float
+    arc: float
 
     def distance(self, radius: float) -> float:
         """Return the distance [m] of the ball's centre from the camera, if the ball has this `radius` [m]."""

@@ -102,7 +102,7 @@ class Cameras:
         return self._sensor.moments()
 
     def expose(self, name: str, postures: Sequence[Array]) -> Picture:
-        """Return the picture of a camera (height, width, 3), bytes red, green, blue; `name`: of the camera.
+        """Return the picture of a camera (height, width, 3), bytes red, green, blue; `name`: name of the camera.
 
         `postures`: positions of all motors (n,) rad in the simulation, at each of the `moments`. The method adds the offsets
         `errors.encoders` to them, so that the encoders of the head are wrong by these offsets.

@@ -30,7 +30,7 @@ class CameraSettings(Settings):
     Args:
         width: columns of a picture.
         height: rows of a picture.
-        lens: of every camera.
+        lens: lens of every camera.
         exposure: s, time during which a picture collects light: motion within it is blurred.
         samples: number of times within the exposure at which the scene is drawn, each at another place within the pixels.
         gain: factor on the signal; the exposure is adapted such that the brightness is the same, so a gain of 2 collects half of the light.

@@ -24,7 +24,7 @@ AXES = ("x", "y", "z", "turn_x", "turn_y", "turn_z")  # of a mount
 class Rig:
     """A robot with cameras, before a calibration; it defines the order of the calibration's parameters.
 
-    `cameras`: by name, at their positions in the model. `lens`: of all cameras. `tag`: on the palm, or None.
+    `cameras`: by name, at their positions in the model. `lens`: lens of all cameras. `tag`: on the palm, or None.
     """
 
     robot: Robot

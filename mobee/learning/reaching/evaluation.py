@@ -39,9 +39,9 @@ NO_STATE = -1  # instead of a state, where no reach was made
 class Evaluation:
     """The results of an evaluation: arrays (R, P) for R repetitions of P problems.
 
-    `rewards`: of the reach, 0 if none was made. `states`: from which the reach was made, -1 if none. `missing`: m, remaining distance after
-    the reach, NaN if none was made. `failures`: number of failed transitions. `actions`: number of actions, with the reach. `duration`: s
-    of plant time.
+    `rewards`: reward of the reach; 0 if no reach was made. `states`: state from which the reach started; -1 without a reach. `missing`: m,
+    remaining distance after the reach; NaN without a reach. `failures`: number of failed transitions. `actions`: number of actions, the
+    reach included. `duration`: s, by the plant's clock.
     """
 
     rewards: Array

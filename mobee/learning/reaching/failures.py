@@ -245,7 +245,10 @@ class FailuresSinceChange:
 
 
 def by_target(touched: tuple[str, ...]) -> bool:
-    """Return whether the target may have caused the failure of a transition, because it is among the world objects `touched` at its end."""
+    """Return whether the target may have caused the failure of a transition, that is, whether it is among the objects touched at the end.
+
+    `touched`: names of the world objects in contact at the end of the transition.
+    """
     return TARGET in touched
 
 

@@ -26,11 +26,15 @@ class ReachTable(TabularPlant):
     The random outcome of the n-th action depends only on the seed and n.
 
     Args:
-        space, outcomes, probabilities, seed, start: as for `TabularPlant`.
+        space: the states and transitions.
+        outcomes: (S, A, B) the states in which each transition may end.
+        probabilities: (S, A, B) of the outcomes, if no target blocks the transition.
         world: a function of a target's position (3,) m, called once for each position. It returns the mean remaining distance [m] of a
             reach from each state, (S,), and the probability that the target blocks each transition, (S, A). A blocked transition ends in
             its start state.
         noise: standard deviation of the remaining distance, m.
+        seed: seed of all random outcomes.
+        start: the first state.
     """
 
     def __init__(

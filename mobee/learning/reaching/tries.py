@@ -58,10 +58,10 @@ class Step:
 
     `n`: number of the step, 1, 2, ... `number`: number of its problem-try, 1, 2, ... `problem`: number of its target, 0, 1, ... `s`,
     `s_next`: states before and after. `a`: the action of a transition, or REACH (-1). `failed`: whether a transition led to no state of
-    higher value. `reward`: of a transition 0, or the penalty if it failed; of a reach that of thesis eq. 8.4. `expected`: the reward
-    predicted before a reach. `missing`: m, remaining distance after a reach. Both are 0 for a transition. `settled`: False after a timeout.
-    `duration`: s, by the plant's clock. `q`: rad, all motors of the part at the end (of a reach: when its force ended). `touched`: names of
-    world objects in contact then.
+    higher value. `reward`: the reward of a reach (thesis eq. 8.4); for a transition 0, or the penalty if it failed. `expected`: the reward
+    predicted before a reach; 0 for a transition. `missing`: m, remaining distance after a reach; 0 for a transition. `settled`: False after
+    a timeout. `duration`: s, by the plant's clock. `q`: (n_part,) rad, all motors of the part at the end (for a reach: when its force
+    ended). `touched`: names of the world objects that the robot touched at the end.
     """
 
     n: int
@@ -84,10 +84,11 @@ class Step:
 class Try:
     """A problem-try that has ended.
 
-    `number`: 1, 2, ... `problem`: number of its target. `path`: its transitions, as (s, a, s', failed). `reach_state`: the state where the
-    reach started; None: the try ended at the limit of actions without a reach. `reward`, `expected`: observed and predicted reward of the
-    reach. `intrinsic`: expected minus observed reward (thesis eq. 8.6). `missing`: m, remaining distance after the reach. These four are 0
-    without a reach. `timeouts`: number of actions that timed out. `duration`: s, by the plant's clock.
+    `number`: its number, 1, 2, ... `problem`: number of its target. `path`: its transitions, each as (state, action, next state, failed).
+    `reach_state`: the state where the reach started; None: the try ended at the limit of actions without a reach. `reward`, `expected`:
+    observed and predicted reward of the reach. `intrinsic`: expected minus observed reward (thesis eq. 8.6). `missing`: m, remaining
+    distance after the reach. `reward`, `expected`, `intrinsic` and `missing` are 0 without a reach. `timeouts`: number of actions that
+    timed out. `duration`: s, by the plant's clock.
     """
 
     number: int

@@ -99,12 +99,13 @@ DECIMALS = 9  # of rad: poses that are equal to this precision are one
 def roadmap_space(roadmap: Roadmap, joints: Sequence[str] | None = None) -> Space:
     """Return a space whose states are a roadmap's poses and whose actions are its edges, in both directions.
 
-    States are the vertices of the map's largest connected part, in their order; the other parts cannot be reached from it. Vertices that
-    have the same positions of `joints` become one state. The other motors of the part keep their position in the map.
+    States are the vertices of the map's largest connected component, in their order; all other vertices are left out. Vertices that have
+    the same positions of `joints` become one state. The part's motors that are not in `joints` stay at their position in the
+    component's first vertex.
 
     Args:
         roadmap: e.g. of `mobee.build_roadmap`.
-        joints: motor names of one part; None: the motors that may move in the map.
+        joints: names of motors of one part of the robot; None: the motors that may move in the map.
 
     Raises:
         InvalidValue, UnknownName: the joints belong to several parts, a name is unknown, or no edge joins two different states.

@@ -71,8 +71,8 @@ _PREFIX = "front_"  # of the names of arrays that only the building needs
 class Progress:
     """Progress of building a roadmap.
 
-    `vertices`: number of vertices found. `evaluations`: number of poses evaluated. `open`: number of vertices or points from which the
-    builder may still continue. `seconds`: time spent.
+    `vertices`: number of vertices found. `evaluations`: number of poses evaluated. `open`: number of vertices from which a search may still
+    start, or of lattice points that are still to be tried. `seconds`: time spent, in s.
     """
 
     vertices: int
@@ -96,7 +96,7 @@ class Builder(Protocol):
 
     @property
     def open(self) -> int:
-        """Number of vertices or points from which the builder may still continue."""
+        """Number of vertices from which a search may still start, or of lattice points that are still to be tried."""
 
     def step(self) -> bool:
         """Search for further vertices; return False if there is nothing left to try."""

@@ -73,6 +73,7 @@ _BORDER = 1e-9  # barycentric: points on the border are inside
 class SimplexRegion:
     """The region of a task space that is covered by simplices (R of thesis Algorithm 4).
 
+    All points are task coordinates divided by the spacing of the roadmap, so corners of a simplex are about 1 apart.
     A simplex is stored as its first corner, the origin, and the inverse of the matrix of its edges. `dimensions`: m of the task space.
     """
 
@@ -97,7 +98,10 @@ class SimplexRegion:
         return inverse
 
     def covers(self, points: Array) -> Flags:
-        """Return whether each of the points (N, m) is inside a simplex of the region, (N,). The points should be near each other."""
+        """Return whether each of the points (N, m) is inside a simplex of the region, (N,).
+
+        The call is fast if the points are near each other, because then only few simplices are tested.
+        """
         covered: Flags = np.zeros(len(points), dtype=bool)
         if not len(self._origins) or not len(points):
             return covered
@@ -129,7 +133,7 @@ class Frontier:
 
     A direction of a vertex is free if the point one spacing away is inside the box, keeps MIN_DISTANCE (0.8) to all vertices and is not
     covered by a simplex. The free directions of all vertices are updated with each new vertex, so that no search is started that cannot
-    succeed. `low`, `high`: (m,) corners of the box. m is the dimension of the task space.
+    succeed. `low`, `high`: (m,) corners of the task's box, in spacings. m is the dimension of the task space.
     """
 
     def __init__(self, low: Array, high: Array) -> None:

@@ -32,8 +32,8 @@ BATCH = 80  # poses per call of the model; fixed, so that results do not depend 
 class EvaluatedPoses:
     """The evaluation of N poses.
 
-    `cost`: (N,). `valid`: (N,) whether all terms are within their tolerances and the pose is inside the task's box. `point`: (N, m) task
-    coordinates divided by the spacing.
+    `cost`: (N,) sum of the costs of all terms (`mobee.costs`) and of the distance outside the task's box. `valid`: (N,) whether all terms
+    are within their tolerances and the pose is inside the box. `point`: (N, m) task coordinates divided by the spacing.
     """
 
     cost: Array
@@ -53,7 +53,10 @@ class PoseEvaluator:
         self._pool = pool
 
     def evaluate(self, q: Array) -> EvaluatedPoses:
-        """Evaluate poses q (N, n) rad; the result of a pose does not depend on the other poses."""
+        """Evaluate poses q (N, n) rad, and add their number to `problem.evaluations`.
+
+        The result of a pose does not depend on the other poses.
+        """
         self.problem.evaluations += len(q)
         batches = [q[k : k + BATCH] for k in range(0, len(q), BATCH)]
         if len(batches) == 1:
@@ -93,7 +96,7 @@ class PoseEvaluator:
 
 
 def scaled_cost(term: Term, residual: Array) -> Array:
-    """Return the cost (N,) of residuals (N,) of a term.
+    """Return the cost (N,) of the residuals (N,) that a term has in N poses, scaled by its tolerance for an evolution strategy.
 
     It is (residual / tolerance)^2. For tolerance 0 it is 1 + 10 weight residual where the residual is above 0, else 0. Without a tolerance
     it is weight * residual.

@@ -42,24 +42,41 @@ class Lattice:
         self._close = [tuple(offset) for offset in offsets[distances < MIN_DISTANCE].tolist()]
 
     def y(self, points: Ints) -> Array:
-        """Return the task coordinates (N, m) of points (N, m), in the units of the coordinates."""
+        """Return the task coordinates (N, m) of lattice or intermediate points, each in the unit of its coordinate (for example m or rad).
+
+        `points`: (N, m) whole numbers, which count half edges of the lattice from the middle of the box.
+        """
         found: Array = self._origin + (points @ self._edges) * self._spacing
         return found
 
     def neighbours(self, points: Ints) -> list[list[Point]]:
-        """Return for each of the points (N, m) a list of the lattice points in the box that are at most one spacing away."""
+        """Return for each point a list of the lattice points in the task's box at most one spacing away, without the point itself.
+
+        `points`: (N, m) whole numbers, which count half edges of the lattice from the middle of the box; a point in the result is a tuple
+        of m such numbers.
+        """
         return self._shifted(points, self._neighbours, lattice_only=True)
 
     def intermediate(self, points: Ints) -> list[list[Point]]:
-        """Return for each of the lattice points (N, m) a list of the points in the box that are half a spacing away."""
+        """Return for each lattice point a list of the intermediate points in the task's box that are half a spacing away.
+
+        `points`: (N, m) whole numbers, which count half edges of the lattice from the middle of the box; a point in the result is a tuple
+        of m such numbers.
+        """
         return self._shifted(points, self._halves, lattice_only=False)
 
     def too_close(self, point: Point) -> list[Point]:
-        """Return the points that are nearer than MIN_DISTANCE (0.8 spacings) to a point."""
+        """Return the lattice and intermediate points nearer than MIN_DISTANCE (0.8 spacings) to a point, also those outside the box.
+
+        Each point is a tuple of m whole numbers, which count half edges of the lattice from the middle of the box.
+        """
         return [tuple(a + b for a, b in zip(point, offset, strict=True)) for offset in self._close]
 
     def nearest(self, y: Array) -> Ints:
-        """Return lattice points (N, m) in the box that are approximately nearest to task coordinates y (N, m)."""
+        """Return for each of N task coordinates y (N, m) a lattice point in the task's box that is approximately the nearest one.
+
+        The result (N, m) has whole numbers, which count half edges of the lattice from the middle of the box.
+        """
         scaled = np.clip((y - self._origin) / self._spacing, -self._width, self._width)
         edges = 0.5 * scaled @ np.linalg.inv(self._edges)
         whole, inward = (2 * rounded.astype(np.intp)[:, None] for rounded in (np.rint(edges), np.trunc(edges)))
@@ -101,10 +118,11 @@ def _offsets(dimensions: int) -> Ints:
 
 @dataclass(slots=True, eq=False)
 class FailedPoint:
-    """A lattice point for which no valid pose was found so far.
+    """A lattice point, or a point half-way between lattice points, for which no valid pose was found so far.
 
-    `q`: (n,) rad, the best posture found. `violation`: weighted sum of the residuals of this posture beyond their tolerances; infinite if
-    least squares has found no posture at the point. `left`: number of tries left.
+    `q`: (n,) rad, the best posture found; before the first try of a point half-way, the posture of the lattice point beside it.
+    `violation`: sum of weight times residual of this posture over the terms beyond their tolerances; infinite if least squares has found no
+    posture at the point. `left`: number of tries left.
     """
 
     q: Array
@@ -113,11 +131,12 @@ class FailedPoint:
 
 
 class PointTable:
-    """The status of the points of a lattice.
+    """The status of the points of a `Lattice`: which were reached, are to be tried, or have failed.
 
-    `vertex`: number of the vertex at each point that was reached. `q`, `y`: poses (n,) rad and task coordinates (m,) of the vertices, by
-    number. `untried`: points next to vertices, each with the vertices from which a try still has to start. `failed`: points for which no
-    valid pose was found so far. `intermediate`: the intermediate points that were tried or are scheduled.
+    `vertex`: dict from each point that was reached to the number of its vertex. `q`, `y`: lists of the poses (n,) rad and task coordinates
+    (m,) of the vertices, by number. `untried`: dict from each lattice point next to a vertex to the vertices from whose postures it is
+    still to be tried. `failed`: dict from each point without a valid pose so far to its `FailedPoint`. `intermediate`: the points half-way
+    between lattice points that were tried or are to be tried.
 
     Args:
         motors: number n of motors of the robot.
@@ -185,11 +204,13 @@ FIRST_ROUNDS = 8  # of tries at random points, until the first pose is found
 
 @dataclass(frozen=True, slots=True)
 class Patience:
-    """Limits of the work on a lattice point that was not reached from its neighbours' postures.
+    """Limits of the work on a lattice point that was not reached from the postures of its neighbours.
 
-    `starts`: number of least-squares starts per try. `tries`: number of tries of a lattice point. `hopeless`: number of tries of a point
-    for which no pose was found even with contacts. `between`: number of tries of an intermediate point. `scouts`: number of random points
-    anywhere in the box that are tried together when no other points are left.
+    `starts`: number of start postures of least squares in each try. `tries`: largest number of tries of a lattice point at which least
+    squares has found a posture that only violates tolerances, for example because it has contacts. `hopeless`: the same for a point at
+    which least squares has found no posture at all. `between`: the same for an intermediate point, half-way between lattice points.
+    `scouts`: number of random positions drawn together from the task's box, whose nearest lattice points are tried when no other points are
+    left.
     """
 
     starts: int = 8
@@ -254,11 +275,15 @@ class LatticeBuilder:
 
     @property
     def open(self) -> int:
-        """Number of points next to vertices that are still to be tried."""
+        """Number of lattice points next to vertices that are still to be tried from a vertex's posture."""
         return len(self._table.untried)
 
     def step(self) -> bool:
-        """Try the next points; return False if there are none left to try."""
+        """Search for poses at the next points of the lattice; return False if the building is finished.
+
+        A step tries points next to vertices; if there are none, failed points again; then it adds points half-way between lattice points;
+        at last it tries random points, and the building is finished when none of these is reached. Also False without a first pose.
+        """
         if not self.vertices:
             return self._find_first()
         return self._try_neighbours() or self._retry_failed() or self._add_intermediate() or self._try_random_points()

@@ -70,12 +70,18 @@ class SearchScheduler:
         return not len(self._frontier) and self._begun >= MAX_FIRST_SEARCHES and not (self.vertex == FIRST).any()
 
     def expandable(self) -> Flags:
-        """Return whether a search may start from each vertex, (V,): its weight is above 0 and, by default, it has a free direction."""
+        """Return whether a search may start from each vertex, (V,): its expansion weight must be above 0.
+
+        With the setting `frontier` (the default) it must also have a free direction, as `Frontier` defines it.
+        """
         able: Flags = self._frontier.weights > 0.0
         return able & self._frontier.free.any(axis=1) if self._settings.frontier else able
 
     def refill(self) -> None:
-        """Start new searches until L are running or no vertex is left; the vertex with the largest weight first, then the older one."""
+        """Start new searches until L are running, or no vertex is left from which a search may start.
+
+        Vertices with larger expansion weights come first; among vertices with equal weights, the one that was found first.
+        """
         room = np.flatnonzero(self.vertex == IDLE).tolist()
         if not len(self._frontier):
             self._begin_first(room)
@@ -94,10 +100,10 @@ class SearchScheduler:
                 busy.append(self._centre(room.pop(0)))
 
     def end_successful(self, number: int, point: Array, simplex: Array | None) -> None:
-        """End the search `number`, which has found a vertex, and all searches whose aims the new vertex occupies.
+        """End the search `number`, which has found a vertex, and all searches whose aims the new vertex makes useless.
 
-        The latter do not count as failures. `point`: (m,) of the new vertex, in spacings. `simplex`: (m, m) inverse of the edges of its
-        simplex, or None.
+        An aim is useless if it is nearer than 0.8 spacings to the new vertex or inside its simplex; such a search does not count as failed.
+        `point`: (m,) of the new vertex, in spacings. `simplex`: (m, m) inverse of the edges of its simplex, or None.
         """
         if self.vertex[number] >= 0:
             self._ages.append(self.searches.age[number])

@@ -29,12 +29,12 @@ class PathRates:
     """
 
     weights: Array
-    effective: float  # effective number of samples in the better half
-    path: float  # decay of the path per generation
+    effective: float
+    path: float
     damping: float
-    rank_one: float  # learning rate of the shape from the path
-    rank_all: float  # learning rate of the shape from the samples
-    length: float  # mean length of a standard normal vector
+    rank_one: float
+    rank_all: float
+    length: float
 
 
 def path_rates(dimensions: int, population: int, separable: bool = False) -> PathRates:

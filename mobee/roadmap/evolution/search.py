@@ -210,8 +210,11 @@ def minimize(
 ) -> Minimum:
     """Minimise a cost until a sample costs at most `target`, or until the number of `evaluations` is used up.
 
-    `cost`: takes samples (population, d) and returns their costs (population,). `start` (d,), `std`: first mean and standard deviation.
-    `limits`: (d, 2) box, or None. The other arguments are those of `Search`.
+    `cost`: takes samples (population, d) and returns their costs (population,). `start` (d,), `std` (one number or (d,)): first mean and
+    standard deviation of the search distribution. `limits`: (d, 2) box, in which the samples stay; None: no box. `restart`: when to
+    restart; it needs limits; None: never. `population`: samples per generation, at least 4; None: 4 + 3 ln(d), rounded down. `method`:
+    "full", "separable", "xnes" or "snes", as in `NES`. `seed`: seed of the random numbers, or a generator. Raises InvalidValue or
+    UnknownName for an argument that is not valid.
     """
     search = Search(start, std, limits, restart, population, method, seed)
     while search.best_cost > target:

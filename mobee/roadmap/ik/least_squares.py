@@ -47,13 +47,14 @@ class Descent:
 
     @cached_property
     def drawn(self) -> Flags:
-        """Whether each of the d motors that may move gets a random position in a random start, (d,): it affects an aim or a term."""
+        """Whether each of the d motors that may move gets a random position in random start poses, (d,): it affects an aim or a term."""
         return needed(self._problem, self._aims)
 
     def run(self, q: Array, goals: Array | None = None) -> Array:
-        """Return the solutions (K, n) rad that meet every aim, of those found from the starts q (B, n) rad.
+        """Search from the start poses q (B, n) rad; return only the K solutions that meet every aim, (K, n) rad.
 
-        `goals`: numbers of the further aims for each start, (B, ...), as in `Descent.ends`; None: those of the constructor.
+        `goals`: for each start the further aims (`besides`), as numbers from `aim_reals`, (B, 26 * number of further aims); None: those of
+        the constructor.
         """
         ends, met = self.met(q, goals)
         return ends[met]
@@ -61,7 +62,8 @@ class Descent:
     def met(self, q: Array, goals: Array | None = None) -> tuple[Array, Flags]:
         """Return the solutions (B, n) rad found from the starts q (B, n) rad, and whether each solution meets every aim, (B,).
 
-        `goals`: numbers of the further aims for each start, (B, ...), as in `Descent.ends`; None: those of the constructor.
+        `goals`: for each start the further aims (`besides`), as numbers from `aim_reals`, (B, 26 * number of further aims); None: those of
+        the constructor.
         """
         ends, residuals = self.ends(q, goals)
         met: Flags = (residuals > self._enough).sum(axis=1) == 0
@@ -70,8 +72,8 @@ class Descent:
     def ends(self, q: Array, goals: Array | None = None) -> tuple[Array, Array]:
         """Return the solutions (B, n) rad found from the starts q (B, n) rad, and the residuals of all aims there, (B, aims), m or rad.
 
-        `goals`: numbers of the further aims (`besides`) for each start, a row of `aim_reals` each, (B, 26 * number of further aims); None:
-        those of the constructor for all starts.
+        `goals`: for each start the further aims (`besides`), as numbers from `aim_reals`, (B, 26 * number of further aims); None: those of
+        the constructor. The number of evaluated poses is added to `problem.evaluations`.
         """
         from mobee._core.least_squares import descend  # loads the core, so it is imported only when needed
         from mobee.model.engine import robot_handle
@@ -88,9 +90,10 @@ class Descent:
 
 
 def least_squares(problem: Problem, rng: np.random.Generator) -> Array | None:
-    """Return a pose (n,) rad within all tolerances, or None if the problem has no aims or no such pose was found.
+    """Return a pose (n,) rad within all tolerances; None if no such pose was found, or no term has aims (residuals for least squares).
 
-    The starts are solved in groups. If several poses of one group are within all tolerances, the pose with the lowest cost is returned.
+    The first start is the start pose of the problem; the other starts are random and are solved in groups. If several poses of one group
+    are within all tolerances, the pose with the lowest cost is returned.
     """
     descent = Descent(problem)
     if not descent.count:

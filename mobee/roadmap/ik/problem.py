@@ -23,7 +23,10 @@ _KNOWN: WeakKeyDictionary[Model, Model] = WeakKeyDictionary()
 
 
 def solid_model(model: Model) -> Model:
-    """Return a model of the same world whose robot has only its solid shapes, without fields; it is cached for each model."""
+    """Return a model of the same world whose robot has only its solid shapes.
+
+    The fields, which are larger shapes that cause repulsive forces, are left out. The result is cached for each model.
+    """
     known = _KNOWN.get(model)
     if known is None:
         known = _KNOWN[model] = Model(solid_robot(model.robot), model.world)
@@ -32,7 +35,7 @@ def solid_model(model: Model) -> Model:
 
 @per_robot
 def solid_robot(robot: Robot) -> Robot:
-    """Return the robot without its fields, that is, only with its solid shapes."""
+    """Return a copy of the robot with only its solid shapes; the fields, larger shapes that cause repulsive forces, are left out."""
     kept = [index for index, shape in enumerate(robot.shapes) if shape.role == "solid"]
     number = {index: k for k, index in enumerate(kept)}
     pairs = [(number[int(a)], number[int(b)]) for a, b in robot.solid_pairs]
@@ -52,9 +55,11 @@ _MIN_EFFECT = 1e-9
 
 
 def needed(problem: Problem, aims: Iterable[Aim]) -> Flags:
-    """Return whether each of the d motors that may move affects one of the aims or a term without aims, (d,).
+    """Return which of the d motors that may move need a random position in the starts of the pose search, (d,).
 
-    An effect on contacts does not count, because a random finger posture, for example, would only add contacts.
+    A motor needs one if it moves a link of one of the `aims` (residuals for least squares), or is the motor of an aim. It also needs one if
+    it changes a term that has a tolerance but, without a derivative, no aims; this is tested in PROBES (3) random poses. The term
+    "collision" is left out: if the fingers, for example, began at random positions, they would only cause more contacts.
     """
     moves = _movers(problem.model.robot, aims)[problem.free]
     others = [one for one in problem.terms if one.aims is None and one.tolerance is not None and one.name != "collision"]

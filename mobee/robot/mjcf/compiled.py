@@ -48,11 +48,12 @@ def is_mjcf(path: Path) -> bool:
 class Compiled:
     """A model as MuJoCo compiles it, with every hinge and slide at zero; lists are in the order of MuJoCo's ids.
 
-    `path`: of the file. `model`: MuJoCo's MjModel, a table of arrays. `bodies`, `inertial`, `geoms`, `sites`, `cameras`: the frames of
+    `path`: path of the file. `model`: MuJoCo's MjModel, a table of arrays. `bodies`, `inertial`, `geoms`, `sites`, `cameras`: the frames of
     these elements in the world's frame; `inertial`: at the centres of mass. `anchors` (m), `axes`: (joints, 3), a point on the axis and the
     unit axis of each joint, in the world's frame. `names[kind]`: the names of the elements of a kind ("body", "joint", "geom", "site",
     "key" and so on); an element without a name gets one from its kind and number. `lines[kind]`: the lines of these elements in the file; 0
-    if MuJoCo does not record the line. The other fields are the kinds of the elements, as text.
+    if MuJoCo does not record the line. The remaining attributes have the kind of each joint, geom, equality and so on as text, for example
+    "hinge".
     """
 
     path: Path

@@ -30,10 +30,10 @@ def joint_limits(compiled: Compiled, joint: int) -> Array:
 
 
 def home_pose(compiled: Compiled, asked: str | None) -> tuple[Array, int | None]:
-    """Return MuJoCo's position vector qpos at home, and the number of the keyframe from which it is, or None.
+    """Return MuJoCo's position vector qpos at home, and the number of the keyframe that contains it; None if no keyframe does.
 
-    `asked`: name of the keyframe, or "zero" for every joint at 0. None: the first of the names HOMES ("home", "ready", ...) that a
-    keyframe has, else the only keyframe; else the pose in which the file draws the robot. Raises UnknownName.
+    `asked`: name of the keyframe, or "zero" for every joint at 0. None: the first of the names HOMES ("home", "ready", ...) that a keyframe
+    has, else the only keyframe; else the pose in which the file draws the robot. Raises UnknownName if no keyframe has the name `asked`.
     """
     model, names = compiled.model, compiled.names["key"]
     lower = {name.lower(): index for index, name in enumerate(names)}

@@ -111,7 +111,11 @@ LEAST = 1e-6  # m, the smallest edge, radius or height, for flat and thin meshes
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Primitive:
-    """A geometric volume: `kind` and `size` as in `mobee.robot.robot.Shape`, `centre` (3,) m and orientation `rotation` (3, 3)."""
+    """A geometric volume with `centre` (3,) m and orientation `rotation` (3, 3).
+
+    `kind`: "sphere", "capsule", "cylinder" or "box". `size` in m, as in `mobee.robot.robot.Shape`: sphere (radius,); capsule and cylinder
+    (radius, height); box (x, y, z), full edges.
+    """
 
     kind: ShapeKind
     size: tuple[float, ...]

@@ -23,16 +23,17 @@ from mobee.robot.xml.volume import Z, turn_about
 class Skeleton:
     """The tree of a URDF at zero pose; the links of fixed joints are merged into the links that carry them.
 
-    `links`: names of the robot's links. `index`: URDF link -> index of the robot's link. `frames`: URDF link -> its frame in the root
-    frame. `joints`: the robot's joints. `moving`: the same joints as in the URDF. `marked`: URDF links that become markers.
+    `links`: names of the robot's links. `index`: dict from the name of a URDF link to the index of the robot's link. `frames`: dict from
+    the name of a URDF link to its frame in the root frame. `joints`: the robot's joints. `moving`: for each of these joints, the joint of
+    the URDF from which it was made. `marked`: names of the URDF links that become markers.
     """
 
     links: list[str]
-    index: dict[str, int]  # URDF link -> link of the robot
-    frames: dict[str, Frame]  # URDF link -> its frame, root frame
+    index: dict[str, int]
+    frames: dict[str, Frame]
     joints: list[Joint] = field(default_factory=list)
     moving: list[UrdfJoint] = field(default_factory=list)
-    marked: list[str] = field(default_factory=list)  # links that become markers
+    marked: list[str] = field(default_factory=list)
 
 
 def lay_out(tree: Tree) -> Skeleton:

@@ -32,12 +32,12 @@ OwnFields = Literal["none", "far apart", "all"]
 class PairRules:
     """Rules for the pairs of links whose contacts are not computed, and for the fields of one part that are tested with each other.
 
-    `links`: URDF link -> index of the robot's link. `adjacent`: pairs of adjacent links (indices), each with the reason. `srdf`: its
-    disabled and enabled pairs. `own`: which fields of one part are tested with each other: "none", "far apart"
-    (`mobee.robot.urdf.pairs.far_apart`) or "all".
+    Fields are volumes that cause repulsive forces. `links`: dict from the name of a URDF link to the index of the robot's link. `adjacent`:
+    pairs of adjacent links (indices), each with the reason. `srdf`: the content of the SRDF file, with its disabled and enabled pairs.
+    `own`: which fields of one part are tested with each other: "none", "far apart" (`mobee.robot.urdf.pairs.far_apart`) or "all".
     """
 
-    links: dict[str, int]  # URDF link -> link of the robot
+    links: dict[str, int]
     adjacent: dict[LinkPair, str]
     srdf: Srdf
     own: OwnFields = "none"
@@ -69,7 +69,8 @@ def adjacent_links(joints: Sequence[Joint], shapes: Sequence[Shape]) -> dict[Lin
 def shape_pairs(joints: Sequence[Joint], shapes: Sequence[Shape], owners: Sequence[str], role: str, rules: PairRules) -> Ints:
     """Return the pairs of shapes of one role ("solid" or "field") that are tested for contacts, (p, 2), indices in `shapes`.
 
-    `owners`: for each shape the name of its URDF link.
+    A field is a volume that causes a repulsive force. `owners`: for each shape the name of its URDF link. `rules`: the pairs of links and
+    the fields that are not tested.
     """
     chosen = np.array([index for index, shape in enumerate(shapes) if shape.role == role], dtype=np.intp)
     names = {name: k for k, name in enumerate(rules.links)}

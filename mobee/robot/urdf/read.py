@@ -28,11 +28,11 @@ from mobee.robot.xml.pairs import without_ignored
 class UrdfOptions:
     """Options for reading a URDF or MJCF file.
 
-    `field`: distance [m] by which fields extend beyond the solids; None: no fields. `meshes`: "hull": a mesh becomes its convex hull;
-    "bounding": the smallest sphere, capsule, cylinder or box around it. `corners`: largest number of corners of a hull, at least 8; "all":
-    the exact hull. `srdf`: the SRDF file (URDF only); None: an SRDF beside the URDF or in ../srdf (`mobee.robot.urdf.srdf.find_srdf`).
-    `home`: the name of a <group_state> (URDF) or a keyframe (MJCF), or "zero"; None: the pose called "home", or another pose of the file
-    (`mobee.robot.urdf.srdf.choose_home`, `mobee.robot.mjcf.motors.home_pose`).
+    `field`: distance [m] by which fields, volumes that cause repulsive forces, extend beyond the solids; None: no fields. `meshes`: "hull":
+    a mesh becomes its convex hull; "bounding": the smallest sphere, capsule, cylinder or box around it. `corners`: largest number of
+    corners of a hull, at least 8; "all": the exact hull. `srdf`: the SRDF file (URDF only); None: an SRDF beside the URDF or in ../srdf
+    (`mobee.robot.urdf.srdf.find_srdf`). `home`: the name of a <group_state> (URDF) or a keyframe (MJCF), or "zero"; None: the pose called
+    "home", or another pose of the file (`mobee.robot.urdf.srdf.choose_home`, `mobee.robot.mjcf.motors.home_pose`).
     """
 
     field: float | None = None

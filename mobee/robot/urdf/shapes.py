@@ -53,8 +53,8 @@ class ShapeReader:
     def read(self, link: Node, index: int, frame: Frame, part: str) -> list[Found]:
         """Return the solids of a <link> element, and the fields that `mobee.robot.urdf.write.write_urdf` added to it.
 
-        `index`: of the robot's link. `frame`: of the link at zero pose, in the root frame. `part`: name of the part of its shapes. Raises
-        RobotFileError for faulty elements and for meshes that cannot be read.
+        Fields are volumes that cause repulsive forces. `index`: index of the robot's link. `frame`: frame of the link at zero pose, in the
+        root frame. `part`: name of the part of its shapes. Raises RobotFileError for faulty elements and for meshes that cannot be read.
         """
         found: list[Found] = []
         for node in link:
@@ -171,9 +171,9 @@ def _capsules(found: list[Found]) -> list[Found]:
 
 
 def grown(shape: Shape, by: float, name: str) -> Shape:
-    """Return a field around a solid: the same shape, larger by `by` m on all sides; around a mesh it is a capsule.
+    """Return a field around a solid: the same shape, larger by `by` m on all sides; around a convex shape (a mesh) it is a capsule.
 
-    `name`: of the field.
+    A field is a volume that causes a repulsive force. `name`: name of the field. Raises ValueError for a convex shape without vertices.
     """
     around = replace(shape, name=name, role="field")
     match shape.kind:

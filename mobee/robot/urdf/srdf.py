@@ -29,14 +29,14 @@ class Srdf:
 
     `disabled`: pairs of links -> reason, file and line. `enabled`: pairs of links. `groups`: name -> its element and its joints, in the
     order of the file. `states`: name of a <group_state> -> its joints (`State`); the states of several groups with one name are merged.
-    `path`: of the file; None: the robot has no SRDF.
+    `path`: path of the file; None: the robot has no SRDF.
     """
 
-    disabled: dict[NamePair, str] = field(default_factory=dict)  # two links -> reason, file and line
+    disabled: dict[NamePair, str] = field(default_factory=dict)
     enabled: set[NamePair] = field(default_factory=set)
-    groups: dict[str, tuple[Node, tuple[str, ...]]] = field(default_factory=dict)  # joints, in the order of the file
-    states: dict[str, State] = field(default_factory=dict)  # <group_state> by name; those of several groups with one name are one
-    path: Path | None = None  # None: the robot has no SRDF
+    groups: dict[str, tuple[Node, tuple[str, ...]]] = field(default_factory=dict)
+    states: dict[str, State] = field(default_factory=dict)
+    path: Path | None = None
 
 
 def find_srdf(urdf: Path, robot: str) -> Path | None:
@@ -177,8 +177,8 @@ State = dict[str, tuple[Node, float]]  # joint -> its line in the SRDF, and its 
 class Home:
     """A home pose.
 
-    `name`: of the pose. `state`: joint -> its line in the SRDF, and its position [rad or m]. `meant`: whether the pose is named "home" or
-    was requested, so that a position beyond the limits is an error.
+    `name`: name of the pose. `state`: joint -> its line in the SRDF, and its position [rad or m]. `meant`: whether the pose is named "home"
+    or was requested, so that a position beyond the limits is an error.
     """
 
     name: str
@@ -189,8 +189,8 @@ class Home:
 def read_state(group_state: Node, joints: Mapping[str, UrdfJoint], elsewhere: Collection[str]) -> State:
     """Return the positions of the moving joints in a <group_state>: joint -> its line in the SRDF, and its position [rad or m].
 
-    `joints`: of the URDF, by name. `elsewhere`: names of virtual joints, which place the robot in the world; they are skipped. Warns of
-    other names that are not joints of the robot.
+    `joints`: joints of the URDF, by name. `elsewhere`: names of virtual joints, which place the robot in the world; they are skipped. Warns
+    of other names that are not joints of the robot.
     """
     found: State = {}
     for node in group_state:

@@ -33,11 +33,11 @@ class UrdfJoint:
 
     node: Node
     name: str
-    kind: str  # of MOVING, or fixed
+    kind: str
     parent: str
     child: str
-    origin: Frame  # in the parent link's frame
-    axis: Array  # (3,)
+    origin: Frame
+    axis: Array
 
 
 @dataclass(slots=True, eq=False)
@@ -50,7 +50,7 @@ class Tree:
     root: str
     links: dict[str, Node]
     joints: dict[str, UrdfJoint]
-    below: dict[str, list[UrdfJoint]] = field(default_factory=dict)  # parent link -> its joints in the order of the file
+    below: dict[str, list[UrdfJoint]] = field(default_factory=dict)
 
     def walk(self) -> Iterator[UrdfJoint]:
         """Yield every joint in depth-first order: a joint before those that it carries, and siblings in the order of the file."""

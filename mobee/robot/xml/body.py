@@ -53,7 +53,8 @@ MOST_SHAPES = 2000  # the number of tested pairs grows with the square
 def read_skeleton(node: Node, draft: Draft, place: Place, centre: Array, axis: Array, length: float) -> None:
     """Add to the draft the solid and the field that the attributes `radius` and `field` of a <link> or <joint> describe.
 
-    Both are cylinders. `centre`: (3,) m, root frame. `axis`: (3,), of any length. `length`: m. Raises RobotFileError.
+    Both are cylinders; a field is a volume that causes a repulsive force. `centre`: (3,) m, root frame. `axis`: (3,), of any length.
+    `length`: m. Raises RobotFileError.
     """
     for attribute, role in (("radius", "solid"), ("field", "field")):
         if node.number(attribute, 0.0) == 0:
@@ -76,7 +77,10 @@ def read_skeleton(node: Node, draft: Draft, place: Place, centre: Array, axis: A
 
 
 def read_shape(node: Node, draft: Draft, place: Place) -> None:
-    """Read a <sphere>, <capsule>, <cylinder>, <box> or <convex> and add its solid or field to the draft; raises RobotFileError."""
+    """Read a <sphere>, <capsule>, <cylinder>, <box> or <convex> and add its solid or field to the draft; raises RobotFileError.
+
+    A field, a shape with the attribute `field`, is a volume that causes a repulsive force.
+    """
     volume = read_convex(node) if node.tag == "convex" else read_volume(node)
     name = node.optional("name") or free_name(draft, f"{draft.links[place.link]}_{node.tag}")
     if name in draft.shape_names:

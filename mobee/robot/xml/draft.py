@@ -18,33 +18,34 @@ from mobee.robot.xml.node import Node
 class Draft:
     """The elements of a robot file that were read so far; indices as in `mobee.robot.robot.Robot`.
 
-    `subtree`: for each link, the element whose noSelfCollision includes it, -1: none. `drives`: for each joint, its XML element and the
-    name of its motor. `parts`: name -> its XML elements. `hands`: elements with noSelfCollision -> their names in reasons. `hosts`: for
-    each shape, its element. `shape_names`: name -> how many more shapes were named after it. `hides`: camera -> its XML element, and the
-    names of the links that it does not show. `constraints`: part and XML element of each constraint list. `ignores`: <ignore> elements.
+    `subtree`: for each link, the index of the element above it that has the attribute noSelfCollision, -1: none. `drives`: for each joint,
+    its XML element and the name of its motor. `parts`: name -> its XML elements. `hands`: dict from the index of an element with
+    noSelfCollision to its name, for the reasons of untested pairs. `hosts`: for each shape, its element. `shape_names`: dict from the name
+    of a shape to the number of further shapes to whose names a number was appended because of it. `hides`: camera -> its XML element, and
+    the names of the links that it does not show. `constraints`: part and XML element of each constraint list. `ignores`: <ignore> elements.
     `others`: included robots, with the XML elements that include them. `where`: (kind, name) -> "file:line".
     """
 
     links: list[str] = field(default_factory=lambda: ["base"])
-    subtree: list[int] = field(default_factory=lambda: [-1])  # for each link the element whose noSelfCollision holds for it
+    subtree: list[int] = field(default_factory=lambda: [-1])
     joints: list[Joint] = field(default_factory=list)
-    drives: list[tuple[Node, str]] = field(default_factory=list)  # for each joint its element and the name of its motor
+    drives: list[tuple[Node, str]] = field(default_factory=list)
     motors: dict[str, MotorDraft] = field(default_factory=dict)
     parts: dict[str, list[Node]] = field(default_factory=dict)
-    hands: dict[int, str] = field(default_factory=dict)  # the elements with noSelfCollision, and their names in reasons
+    hands: dict[int, str] = field(default_factory=dict)
     elements: list[Element] = field(default_factory=lambda: [Element(-1, "link", "", -1)])
     shapes: list[Shape] = field(default_factory=list)
-    hosts: list[int] = field(default_factory=list)  # for each shape its element
-    shape_names: dict[str, int] = field(default_factory=dict)  # and how many more were named after it
+    hosts: list[int] = field(default_factory=list)
+    shape_names: dict[str, int] = field(default_factory=dict)
     base_shapes: set[int] = field(default_factory=set)
     markers: dict[str, Marker] = field(default_factory=dict)
     bodies: list[Body] = field(default_factory=list)  # perhaps several for one link
     visuals: list[Visual] = field(default_factory=list)
     cameras: dict[str, Camera] = field(default_factory=dict)
-    hides: dict[str, tuple[Node, tuple[str, ...]]] = field(default_factory=dict)  # of each camera: its element, names of links
+    hides: dict[str, tuple[Node, tuple[str, ...]]] = field(default_factory=dict)
     constraints: list[tuple[str, Node]] = field(default_factory=list)
     ignores: list[Node] = field(default_factory=list)
-    others: list[tuple[Node, Placed]] = field(default_factory=list)  # included robots, and the elements that include them
+    others: list[tuple[Node, Placed]] = field(default_factory=list)
     where: dict[tuple[str, str], str] = field(default_factory=dict)
 
     def note(self, kind: str, name: str, node: Node) -> None:
@@ -56,16 +57,17 @@ class Draft:
 class Place:
     """The position of the reader in the tree of a file.
 
-    `point`: (3,) m, root frame, the end of the current <link>, at which its links and joints are attached. `start`: (3,) m, its start, to
-    which shapes and markers are relative. `link`: index of the robot's link. `carrier`: inside a joint, the link that carries the joint,
-    else the same link; elements with turns="false" belong to it. `part`, `motor`: names, "": none. `subtree`: element whose
-    noSelfCollision applies, -1: none. `base`: whether shapes belong to the base. `element`: index of the current element.
+    `point`: (3,) m, root frame, the end of the current <link>, at which the links and joints inside it are attached. `start`: (3,) m, root
+    frame, the start of this <link>, to which its shapes and markers are relative. `link`: index of the robot's link. `carrier`: inside a
+    joint, the link that carries the joint, else the same link; elements with turns="false" belong to it. `part`, `motor`: names of the
+    current part and motor, "": none. `subtree`: index of the element whose attribute noSelfCollision applies, -1: none. `base`: whether
+    shapes belong to the base. `element`: index of the current element.
     """
 
-    point: Array  # (3,) m, the end of a link, where its links and joints are attached
-    start: Array  # (3,) m, the start of a link, to which shapes and markers are relative
+    point: Array
+    start: Array
     link: int = 0
-    carrier: int = 0  # in a joint the link that carries it, else the same link: elements with turns="false" belong to it
+    carrier: int = 0
     part: str = ""
     motor: str = ""
     subtree: int = -1
@@ -76,7 +78,7 @@ class Place:
 def enter(node: Node, draft: Draft, place: Place, name: str) -> Place:
     """Add a <link> or <joint> to the elements of the draft and return the position of the reader inside it.
 
-    `place`: position outside it. `name`: of the element, for the reasons of excluded pairs.
+    `place`: position outside it. `name`: name of the element, for the reasons of excluded pairs.
     """
     index = len(draft.elements)
     if node.flag("noSelfCollision") and place.subtree < 0:

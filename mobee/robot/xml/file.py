@@ -89,7 +89,7 @@ def parse_xml(path: Path, handler: LineHandler) -> None:
 def parse_content(path: Path, content: bytes, handler: LineHandler) -> None:
     """Parse an XML text and send its elements to the SAX handler `handler`.
 
-    `content`: the bytes of the file. `path`: of the file, for messages. Raises RobotFileError if the content is not XML or hostile
+    `content`: the bytes of the file. `path`: path of the file, for messages. Raises RobotFileError if the content is not XML or hostile
     (entities and external references).
     """
     try:
@@ -138,7 +138,8 @@ _ATTRIBUTE = re.compile(rb"""\s*([\w:.-]+)\s*=\s*("[^"<]*"|'[^'<]*')""")
 class Repair:
     """A repair of a faulty file.
 
-    `line`: of the fault. `what`: the change, in words. `remedy`: for the user. `error`: the error that the file would cause without it.
+    `line`: line of the fault. `what`: the change, in words. `remedy`: for the user. `error`: the error that the file would cause without
+    it.
     """
 
     line: int

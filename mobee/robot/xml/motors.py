@@ -27,7 +27,7 @@ class MotorDraft:
     node: Node
     name: str
     part: str
-    index: int  # position within the part
+    index: int
     low: float
     high: float
     home: float
@@ -118,10 +118,10 @@ def _motor(draft: MotorDraft, joints: tuple[tuple[int, float, float], ...]) -> M
 
 
 def read_clauses(node: Node, part: Part, motors: Sequence[str]) -> Clause:
-    """Return a <constraintList> as a clause; its row holds if a.q + b > 0 or, with the attribute `negate`, if a.q + b < 0.
+    """Return a <constraintList> as a clause: a condition on motor positions q, of which at least one row must hold.
 
-    The attribute `q` of a row contains the names of motors of the part, or their numbers within the part. `motors`: the names of all motors
-    of the robot, in the order of q. Raises RobotFileError.
+    A row holds if a.q + b > 0 or, with the attribute `negate`, if a.q + b < 0. The attribute `q` of a row contains the names of motors of
+    the part, or their numbers within the part. `motors`: the names of all motors of the robot, in the order of q. Raises RobotFileError.
     """
     rows, offsets = [], []
     for child in (child for child in node if child.tag == "constraint"):

@@ -33,7 +33,7 @@ FLAGS = {"true": True, "1": True, "yes": True, "false": False, "0": False, "no":
 class Node:
     """An XML element: tag in lower case, attributes as text, children, file and line.
 
-    `repairs`: of a root element only, the repaired faults in the form of the file.
+    `repairs`: for a root element, the faults in the form of the file that were repaired; empty for other elements.
     """
 
     file: Path
@@ -41,7 +41,7 @@ class Node:
     tag: str
     attributes: dict[str, str]
     children: list[Node] = field(default_factory=list)
-    repairs: list[Repair] = field(default_factory=list)  # of the root: faults in the form of the file
+    repairs: list[Repair] = field(default_factory=list)
 
     def __iter__(self) -> Iterator[Node]:
         return iter(self.children)
@@ -78,7 +78,7 @@ class Node:
     def positive(self, name: str, default: float | None = None, unit: str = "metres") -> float:
         """Return the number in the attribute `name`; `default` if it is absent. Raises RobotFileError unless it is above zero.
 
-        `unit`: of the number, for the message.
+        `unit`: unit of the number, for the message.
         """
         value = self.number(name, default)
         if value < SMALLEST:
@@ -130,7 +130,7 @@ class Node:
     def choice(self, name: str, given: str, valid: Collection[str], kind: str) -> str:
         """Return the text `given` if it is one of the `valid` ones; else raise RobotFileError with the nearest valid one.
 
-        `name`: of the attribute, and `kind`: what the text names; both are for the message.
+        `name`: name of the attribute, and `kind`: what the text names; both are for the message.
         """
         if given not in valid:
             self.fail(name, f"unknown {kind} {shown(given)!r}", f"{nearest(given, valid)}Valid: {listed(valid)}")

@@ -107,10 +107,10 @@ def ignore_elements(robot: Robot) -> list[ET.Element]:
 
 
 def role_elements(robot: Robot, role: str, pairs: Ints, own: bool) -> list[ET.Element]:
-    """Return the <ignore> elements that exclude pairs of shapes of one role, beyond the pairs of links in `robot.untested`.
+    """Return the <ignore> elements that exclude pairs of shapes of one role from tests, except the pairs of links in `robot.untested`.
 
-    `role`: "solid" or "field". `pairs`: (p, 2) indices of shapes, the pairs that are tested. `own`: whether the reader of the file also
-    tests fields of one part with each other, so that these need <ignore> elements too.
+    `role`: "solid", or "field", a volume that causes a repulsive force. `pairs`: (p, 2) indices of shapes, the pairs that are tested.
+    `own`: whether the reader of the file also tests fields of one part with each other, so that these need <ignore> elements too.
     """
     chosen = np.array([k for k, shape in enumerate(robot.shapes) if shape.role == role], dtype=np.intp)
     link = np.array([robot.shapes[k].link for k in chosen], dtype=np.intp)

@@ -93,7 +93,7 @@ def finished_cameras(draft: Draft) -> dict[str, Camera]:
 def visual_elements(robot: Robot, link: int, origin: Array, path: Path) -> Iterable[ET.Element]:
     """Yield the <visual> and <camera> elements of a link.
 
-    `link`: its index. `origin`: (3,) m, root frame, the start of the link's element. `path`: of the file into which they are written.
+    `link`: its index. `origin`: (3,) m, root frame, the start of the link's element. `path`: path of the file into which they are written.
     """
     for visual in robot.visuals:
         if visual.link == link:

@@ -32,8 +32,10 @@ KINDS: dict[str, ShapeKind] = {"sphere": "sphere", "capsule": "capsule", "cylind
 class Volume:
     """A volume as a file describes it.
 
-    `kind`, `size`, `vertices`: as in `mobee.robot.robot.Shape`. `centre` (3,) m and `rotation` (3, 3): along the axes of the root frame;
-    the centre is relative to the start of the link or joint that contains the volume.
+    `kind`: "sphere", "capsule", "cylinder", "box" or "convex". `size` in m, as in `mobee.robot.robot.Shape`: sphere (radius,); capsule and
+    cylinder (radius, height); box (x, y, z), full edges; convex (). `vertices`: (v, 3) m, of a convex volume, relative to the centre, along
+    its own axes; else None. `centre` (3,) m and `rotation` (3, 3): along the axes of the root frame; the centre is relative to the start of
+    the link or joint that contains the volume.
     """
 
     kind: ShapeKind

@@ -26,7 +26,7 @@ FORMAT = "mobee calibration 1"
 
 @dataclass(frozen=True, slots=True)
 class Quality:
-    """How far the observed tag is from its position according to parameters: the median and the 95 % quantile.
+    """Distances of the observed tag from the position that a calibration's parameters predict: the median and the 95 % quantile.
 
     `pixels_*`: distances of corners in the pictures [px]. `metres_*`: distances of the middle of the tag in space [m].
     """
@@ -62,7 +62,7 @@ class Calibration:
     Attributes:
         robot: name of the robot.
         cameras: names of the cameras.
-        lens: of all cameras.
+        lens: lens of all cameras.
         tag: the tag on the palm.
         pictures: number of observations that were used.
         names: names of the P parameters.

@@ -82,7 +82,8 @@ class Watcher:
     def look(self, motion: Motion, t: float) -> tuple[Moment, dict[str, Picture]]:
         """Take a picture with every camera; the middle of the exposure is at time t [s] of `motion`.
 
-        Returns the encoders at the stamp, which is wrong by the error of the latency and jitter, and the pictures by name of the camera.
+        Returns the encoders at the stamp, and the pictures by name of the camera. The stamp differs from t by the error of the latency and
+        by jitter.
         """
         stamp = t + self.errors.latency + self.settings.jitter * self._rng.standard_normal()
         postures = [motion.true_at(t + moment) for moment in self._cameras.moments]
@@ -99,8 +100,8 @@ def moved_parts(rig: Rig, part: str) -> tuple[str, ...]:
 def watch_hand(watcher: Watcher, postures: Array, part: str, progress: Callable[[float], None] = lambda share: None) -> list[Observation]:
     """Move the head and the arm `part` through postures (K, n) rad; return the observations of the tag from the cameras.
 
-    `progress`: called with the share of postures that are done. On a real robot, the head's encoders differ from its true positions by
-    offsets; here the offsets are added to the head that carries the cameras, which looks the same to the cameras.
+    `progress`: called with the share of postures that are done. The encoders of the head are wrong by offsets. In the simulation they are
+    right, and the head that carries the cameras is rotated by the offsets instead, so that the pictures are the same.
     """
     rest, found = RESTING * PERIOD + 0.1, []
     for number, posture in enumerate(postures):

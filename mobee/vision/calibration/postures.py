@@ -32,10 +32,10 @@ def choose_postures(rig: Rig, model: Model, settings: CameraSettings, part: str,
     Args:
         rig: the robot, its cameras and the tag.
         model: robot and world, for the contacts.
-        settings: of the cameras.
+        settings: settings of the cameras.
         part: name of the arm.
         count: number of postures.
-        seed: of the random draws.
+        seed: seed of the random draws.
 
     Raises:
         InvalidValue: too few suitable postures were found.

@@ -21,7 +21,7 @@ NEGLIGIBLE = 1e-12  # share of the largest variance below which a direction is l
 class Eye:
     """A camera in the root frame.
 
-    `position`: (3,) m, of the optical centre. `rotation`: (3, 3) with the columns right, down, ahead. `lens`: of the camera.
+    `position`: (3,) m, of the optical centre. `rotation`: (3, 3) with the columns right, down, ahead. `lens`: lens of the camera.
     """
 
     position: Array

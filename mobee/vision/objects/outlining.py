@@ -19,8 +19,9 @@ SOLID = 0.6  # share of its convex hull that a region must fill: the things are 
 def outlined(name: str, likeness: NDArray[np.float32]) -> list[Detection]:
     """Return the regions of a picture that look like the thing `name`, as detections.
 
-    `likeness`: (H, W), proportional to the share of a pixel that shows the thing; 0: none. The likeness of a whole pixel of the thing is
-    the largest value nearby, but at least 1; so an array of shares can be given too.
+    `likeness`: (H, W), proportional to the share of each pixel that shows the thing; 0: none. The largest value near a pixel, but at least
+    1, is taken as the value of a pixel that shows only the thing. The shares themselves, 0 to 1, are valid values too. Small regions, and
+    regions that are far from convex, are left out.
     """
     height, width = likeness.shape
     found = []

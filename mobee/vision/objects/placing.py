@@ -71,8 +71,8 @@ class Placed:
 class Outline:
     """An outline in one picture, without the distortion of the lens.
 
-    `eye`: the camera. `flat`: (m, 2), points (x / z, y / z) in the camera's frame. `inverse`: (m, 2, 2), derivative of these by the pixel.
-    `ray`: (3,) unit vector through the middle of the outline, root frame.
+    `eye`: the camera. `flat`: (m, 2), points (x / z, y / z) of the outline in the camera's frame. `inverse`: (m, 2, 2) [1/px], derivatives
+    of these points with respect to column and row. `ray`: (3,) unit vector through the middle of the outline, root frame.
     """
 
     eye: Eye

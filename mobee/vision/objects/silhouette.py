@@ -41,7 +41,7 @@ def touching(kind: Kind, size: Array, position: Array, rotation: Array, directio
     """Return the points of a shape whose images are farthest along given directions; they lie on its silhouette.
 
     Args:
-        kind: of the shape.
+        kind: kind of the shape.
         size: the lengths of the shape, m.
         position: (3,) m, middle of the shape in the camera's frame; the whole shape must be ahead of the camera.
         rotation: (3, 3), from the shape's axes to the camera's frame.

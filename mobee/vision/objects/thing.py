@@ -18,8 +18,9 @@ TOLERANCE = 0.1  # relative standard deviation of a size from the usual one
 class Thing:
     """A thing that may be seen; several objects may look like it.
 
-    `kind`, `size`: kind of shape and its lengths in m, as in `mobee.Geometry`; cylinders and boxes stand upright. `color`: red, green,
-    blue, 0 to 1. `tolerance`: relative standard deviation of each length from `size`; 0: the size is known exactly.
+    `kind`: "sphere", "cylinder" or "box". `size` in m: sphere (radius,); cylinder (radius, height); box (x, y, z), full edges. Cylinders
+    and boxes stand upright. `color`: red, green, blue, 0 to 1. `tolerance`: relative standard deviation of each length from `size`; 0: the
+    size is known exactly.
     """
 
     name: str

@@ -28,7 +28,7 @@ class TrackSettings(Settings):
     about 0.
 
     Args:
-        hits: number of looks that must show a new object before it counts.
+        hits: number of looks that must show a new object before it gets a name.
         of: number of latest looks among which these hits must be.
         gate: largest squared Mahalanobis distance (3 dimensions) at which a seen position may belong to a track.
         surprise: squared Mahalanobis distance above which an object at rest is assumed to move.
@@ -81,8 +81,8 @@ class Innovation:
 class Track:
     """An object that is followed from look to look; a look is a pair of pictures at one time.
 
-    `name`: unique; empty until the object counts. `born`, `t`, `seen`: times [s] of the first look, of the newest look, and of the newest
-    look that showed the object. `looks`: whether each of the latest looks showed the object.
+    `name`: unique; empty until enough looks have shown the object (`TrackSettings.hits`). `born`, `t`, `seen`: times [s] of the first look,
+    of the newest look, and of the newest look that showed the object. `looks`: whether each of the latest looks showed the object.
     """
 
     def __init__(self, thing: Thing, first: Placed, t: float, settings: TrackSettings) -> None:
@@ -144,7 +144,8 @@ class Track:
         """Return the better innovation of a seen position at time t [s], and whether it is that of a moving object.
 
         The prediction at rest is used, unless the object moves or the position is improbable at rest; then the prediction in motion is
-        used. None if the position is outside the gate. `turned`: angle [rad] by which the gaze has rotated since the last look.
+        used. None if the position is too improbable for this track (`TrackSettings.gate`). `turned`: angle [rad] by which the gaze has
+        rotated since the last look.
         """
         if t > self._moving_until:
             rest = self.innovation(placed, t, turned, moving=False)
@@ -154,7 +155,11 @@ class Track:
         return (moving, True) if moving.distance <= self._settings.gate else None
 
     def update(self, placed: Placed, t: float, found: Innovation, moved: bool) -> None:
-        """Update the track with a seen position at time t [s]; `found` and `moved`: the two results of `best`."""
+        """Update the track with a seen position at time t [s].
+
+        `found`: the comparison of the position with the prediction. `moved`: whether this is the prediction for a moving object. Both are
+        returned by `best`.
+        """
         gain = np.linalg.solve(found.covariance, _SEEN @ found.spread).T
         self._mean = found.mean + gain @ found.difference
         keep = np.eye(9) - gain @ _SEEN

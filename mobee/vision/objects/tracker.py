@@ -32,7 +32,11 @@ class Tracker:
 
     @property
     def tracks(self) -> list[Track]:
-        """The tracks of objects that count, sorted by name; an object is seen at present if its `seen` is the time of the last look."""
+        """The tracks of objects that have a name, sorted by name.
+
+        An object gets a name after it was seen in enough looks (`TrackSettings.hits`). It is seen at present if `seen` of its track is the
+        time of the last look.
+        """
         return sorted((track for track in self._tracks if track.name), key=lambda track: track.name)
 
     def forget(self) -> None:

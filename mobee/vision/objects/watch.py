@@ -31,12 +31,13 @@ class PictureWatch:
     def trouble(self, picture: Picture, stamp: float, now: float, q: Array, has_noise: bool) -> Trouble | None:
         """Return what is wrong with a picture, or None if nothing is wrong.
 
-        "old": the stamp is not newer than the last one. "late": the picture is older than `latest` at its arrival. "dark": almost nothing
-        is bright. "frozen": the picture is equal to the pictures before, although the camera has noise or a motor has moved.
+        "old": the stamp is not newer than the last one. "late": at its arrival the picture is older than the limit `latest` of this watch.
+        "dark": almost nothing is bright. "frozen": the picture is equal to the pictures before, although the camera has noise or a motor
+        has moved.
 
         Args:
             picture: (height, width, 3) bytes.
-            stamp: of its exposure, s.
+            stamp: time of its exposure, s.
             now: time of its arrival by the same clock, s.
             q: encoders at the stamp (n,) rad.
             has_noise: whether the camera is a real one, or is drawn with noise, so that no two pictures are equal.

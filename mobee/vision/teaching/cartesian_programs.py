@@ -63,7 +63,7 @@ class CartesianPrograms:
         return found
 
     def formulas(self, names: Sequence[str]) -> list[str]:
-        """Return the formulas of all outputs as text, those with the largest weights first; `names`: of the inputs."""
+        """Return the formulas of all outputs as text, those with the largest weights first; `names`: names of the inputs."""
         nodes, outputs = self._parts(self._genes)
         texts = list(names)
         for name, first, second in self._steps(nodes):

@@ -17,10 +17,12 @@ PARTS = ("torso", "head")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lesson:
-    """One observation of the ball in the pictures of both cameras, with the position that the teacher reports.
+    """An observation of a ball in the pictures of both cameras of the learner, with the position that the teacher reports.
+
+    The teacher is a robot that carries the ball; the learner is a robot that learns to locate it.
 
     `pixels`: (2, 2) px, column and row of the ball in the left and in the right picture. `moment`: the encoders at the stamp. `reported`,
-    `true`: (3,) m, root frame, position of the ball as the teacher reports it, and as it is. `pose`: number of the teacher's pose.
+    `true`: (3,) m, root frame, position of the ball as the teacher reports it, and as it is. `pose`: index of the teacher's pose.
     """
 
     pixels: Array
@@ -32,10 +34,11 @@ class Lesson:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lessons:
-    """N lessons as arrays.
+    """N lessons (`Lesson`) as arrays.
 
     `inputs`: (N, d), columns and rows of the ball in the left and right picture [px], then encoders [rad]. `reported`, `true`: (N, 3) m,
-    root frame, position of the ball as the teacher reports it, and as it is. `poses`: (N,), number of the teacher's pose.
+    root frame, position of the ball as the teacher, the robot that carries it, reports it, and as it is. `poses`: (N,), index of the
+    teacher's pose.
     """
 
     inputs: Array
@@ -65,10 +68,11 @@ def seeing_motors(robot: Robot) -> Ints:
 
 
 def split_by_pose(poses: Ints, held_out: float, seed: int) -> tuple[Ints, Ints]:
-    """Return the rows to learn from, and the rows to test with; `poses`: (N,) number of the teacher's pose in each row.
+    """Split rows of lessons; return the indices of the rows to learn from, and those of the rows to test with.
 
-    All rows of a pose belong to the same set. `held_out`: share of the poses whose rows are for tests, at least one pose. The rows to learn
-    from are sorted by pose, in random order of the poses, so that the first rows belong to few poses.
+    `poses`: (N,) index of the teacher's pose in each row; the teacher is the robot that shows the ball. All rows of a pose belong to the
+    same set. `held_out`: share of the poses whose rows are for tests, at least one pose. The rows to learn from are sorted by pose, in
+    random order of the poses, so that the first rows belong to few poses. `seed`: seed of the random order.
     """
     each = np.random.default_rng([seed, 0x73706C69]).permutation(np.unique(poses))
     kept = len(each) - max(1, round(held_out * len(each)))

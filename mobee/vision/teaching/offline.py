@@ -32,9 +32,10 @@ def watch_teacher(
 ) -> list[Lesson]:
     """Move the teacher through postures (K, n) rad; at each, look at the ball from several postures of the learner; return the lessons.
 
-    All motions are controlled by the control law, which keeps the robots apart. The teacher reports the position of the ball by its own
-    encoders. In each picture the largest ball counts. There is no lesson if a picture shows no ball, or if the sizes of the balls in both
-    pictures differ much.
+    The teacher is a robot that carries a ball; the learner is a robot with cameras that learns to locate it. All motions are controlled by
+    the control law, which keeps the robots apart. The teacher reports the position of the ball by its own encoders. In each picture the
+    largest ball counts. There is no lesson if a picture shows no ball, or if the sizes of the balls in both pictures differ by more than 35
+    %. A posture that the teacher does not reach is skipped.
 
     Args:
         watcher: the simulated robots, with an object "ball" in their world.
@@ -43,7 +44,7 @@ def watch_teacher(
         postures: (K, n) rad, of the teacher.
         looks: number of postures of the learner for each posture of the teacher.
         share: share of the torso's range that the learner uses, about its home.
-        seed: of the learner's postures.
+        seed: seed of the learner's postures.
     """
     rng, found = np.random.default_rng([seed, 0x6C6F6F6B]), list[Lesson]()
     size, model = (watcher.settings.width, watcher.settings.height), watcher.plant.model

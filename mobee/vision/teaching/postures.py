@@ -42,7 +42,7 @@ class Carried:
 
 
 def teacher_postures(rig: Rig, model: Model, carried: Carried, rest: Array, volume: tuple[Array, Array], count: int, seed: int) -> Array:
-    """Return postures (count, n) rad in which the teacher holds the ball within a volume, without contacts.
+    """Return postures (count, n) rad in which the teacher, the robot that carries the ball, holds it within a volume, without contacts.
 
     Args:
         rig: both robots as one model, with the cameras.
@@ -51,7 +51,7 @@ def teacher_postures(rig: Rig, model: Model, carried: Carried, rest: Array, volu
         rest: (n,) rad, positions of all motors that do not move the ball.
         volume: the lowest and the highest corner of the volume, (3,) m each, root frame.
         count: number of postures.
-        seed: of the random draws.
+        seed: seed of the random draws.
 
     Raises:
         InvalidValue: too few postures were found.
@@ -80,7 +80,7 @@ def gaze_postures(
 ) -> Array:
     """Return postures (K, n) rad, K <= count, in which both cameras of the model see the ball, without contacts.
 
-    Torso and head are drawn at random.
+    The postures of torso and head are drawn at random.
 
     Args:
         rig: both robots as one model, with the cameras.

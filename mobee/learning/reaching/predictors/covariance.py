@@ -192,9 +192,10 @@ def negative_log_posterior(logs: Array, arm: LinearArm, squares: Array, reached:
 
 
 def fitted_parameters(logs: Array, arm: LinearArm, squares: Array, reached: Reached, expected: Array) -> Array:
-    """Return the logarithms of the parameters with the highest posterior, (8 + d,), by a local search from `logs`.
+    """Return the logarithms of the covariance parameters with the highest posterior, (8 + d,), by a local search.
 
-    The arguments are as for `negative_log_posterior`.
+    `logs`: (8 + d,), where the search begins. `arm`: gives the features of the reaches. `squares`: (d, S, S), from `joint_squares`.
+    `reached`: the n pairs of state and target that were tried, with their rewards. `expected`: (n,) prior mean reward of each pair.
     """
     from scipy.optimize import minimize
 

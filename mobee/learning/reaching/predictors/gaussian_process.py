@@ -23,7 +23,12 @@ MAX_CACHE = 300e6  # bytes of rows and covariances of queried targets, of one ta
 
 
 class Query:
-    """The cache of one queried target: its rows (n, S), of which the first `done` are final, and mean and covariance computed from them."""
+    """The cache of one target for which predictions were asked: intermediate results of Gaussian process regression, and the prediction.
+
+    `rows` (n, S) has a row for each of the n reaches so far, and a column for each state: the triangular factor's inverse times the
+    covariance of reaches and states. The first `done` rows are final, and `sure` is the prediction from them. The first `upto` rows are
+    computed, and `mean` (S,), minus the prior mean, and `covariance` (S, S) are the prediction from all of them.
+    """
 
     def __init__(self, at: Points, prior: Array, rows: int) -> None:
         self.at, self.done, self.upto = at, 0, 0
@@ -38,8 +43,10 @@ class Posterior:
     Args:
         arm: gives the prior mean.
         covariance: the covariance function of the mean rewards.
-        state: (n,) states of the reaches observed so far, each for a `target` (n, 3) m.
-        residual: (n,) average of `count` (n,) rewards, minus the prior mean.
+        state: (n,) state of each pair of state and target that was tried so far.
+        target: (n, 3) m, root frame, target of each pair.
+        residual: (n,) average reward of each pair, minus its prior mean.
+        count: (n,) number of rewards in each average.
     """
 
     def __init__(self, arm: LinearArm, covariance: Covariance, state: Ints, target: Array, residual: Array, count: Array) -> None:

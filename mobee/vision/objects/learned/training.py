@@ -53,7 +53,7 @@ def train(
         world: contains the things, and the boxes on which they may stand.
         things: the things to be found.
         pictures: number of rendered pictures from which the network learns.
-        seed: of pictures, pixels and weights.
+        seed: seed of the random pictures, pixels and weights.
         report: called with the share of the work that is done (0 to 1) and a text about the present step.
 
     Raises:
@@ -83,7 +83,10 @@ def train(
 
 
 def held_out(robot: Robot, world: World, things: Sequence[Thing], pictures: int, seed: int) -> Iterator[Labelled]:
-    """Yield test pictures for a network that `train` made with the same arguments: a fifth as many, and other ones than in the training."""
+    """Yield test pictures for a network that `train` made with the same arguments.
+
+    They are a fifth as many as the pictures from which the network learned, and different from them.
+    """
     return labelled_pictures(robot, world, things, max(1, pictures // 5), seed + OTHERS)
 
 
