@@ -71,7 +71,7 @@ class Clock(Message, frozen=True, kw_only=True):
 
 
 class PartStatus(Struct, frozen=True, forbid_unknown_fields=True):
-    """When a part was sampled, and the command that its motors follow; the fields have the same meaning as in `State`."""
+    """Sampling time of a part, state of its gate, and command that its motors follow; the fields have the same meaning as in `State`."""
 
     k: Count  # tick in which the part was sampled
     t: Count  # ns, bus clock, time of the sample
@@ -99,7 +99,7 @@ class Tick(Clock, frozen=True, kw_only=True):
 
 
 class StepDone(Message, frozen=True, kw_only=True):
-    """Lockstep: the sender has published all its messages for tick re_k."""
+    """Answer of a participant to a tick in lockstep: it has published all its messages for tick re_k."""
 
     stream: ClassVar[Stream] = Stream("done/{service}", "STEP", writers=PARTICIPANTS, readers=("robot_sim",), when="in lockstep")
 
@@ -111,7 +111,10 @@ class StepDone(Message, frozen=True, kw_only=True):
 
 
 class Turn(Message, frozen=True, kw_only=True):
-    """Lockstep: tick k waits for the answer of the participant that the key names, because it may have an action to decide."""
+    """Message to one participant in lockstep (the name in the key): tick k waits for its answer.
+
+    The tick waits because the participant may have an action to decide.
+    """
 
     stream: ClassVar[Stream] = Stream("turn/{participant}", "STEP", writers=("robot_sim",), readers=PARTICIPANTS, when="in lockstep")
 
@@ -159,14 +162,14 @@ class Command(Message, frozen=True, kw_only=True):
 
 
 class Order(Struct, frozen=True, forbid_unknown_fields=True):
-    """Drive epoch and kind of command of one part in `Commands`."""
+    """Command to one part in `Commands`, without the reference: number of the sender's ownership (epoch), and kind of command."""
 
     epoch: Count  # drive epoch of the sender, as in `Taken`
     mode: Mode  # kind of command
 
 
 class Answer(Struct, frozen=True, forbid_unknown_fields=True):
-    """Lockstep: the answer to a tick, inside `Commands`; its fields have the same meaning as in `StepDone`."""
+    """Answer of the controller to a tick in lockstep, inside `Commands`; its fields have the same meaning as in `StepDone`."""
 
     ok: bool
     busy: list[Name]
@@ -210,7 +213,7 @@ class Motion(Message, frozen=True, kw_only=True):
 
 
 class Follow(Message, frozen=True, kw_only=True):
-    """A moving attractor of a part. If no new message comes for 0.1 s, the controller takes the attractor as at rest."""
+    """A moving attractor, the posture to which a part moves. If no message comes for 0.1 s, the controller assumes it to be at rest."""
 
     stream: ClassVar[Stream] = Stream(
         "{part}/follow",
@@ -250,7 +253,7 @@ class Reach(Message, frozen=True, kw_only=True):
 
 
 class Playback(Message, frozen=True, kw_only=True):
-    """State of a motion of the robot along a path of a roadmap."""
+    """State of a motion of the robot along a path of a roadmap, which is a graph of poses that was computed before."""
 
     stream: ClassVar[Stream] = Stream(
         "roadmap/playback",
@@ -285,7 +288,7 @@ class Targets(Message, frozen=True, kw_only=True):
 
 
 class MarkerPose(Struct, frozen=True, forbid_unknown_fields=True):
-    """Position and orientation of a marker in the root frame."""
+    """Position and orientation of a marker, which is a named point on a link, in the root frame."""
 
     name: Name
     position: Vector3  # m
@@ -303,7 +306,7 @@ class Pose(Message, frozen=True, kw_only=True):
 
 
 class ContactItem(Struct, frozen=True, forbid_unknown_fields=True):
-    """A contact: two shapes of the robot, or a shape of the robot and an object, that overlap."""
+    """A contact: two shapes of the robot, or a shape of the robot and an object, that overlap. Their names are `first` and `second`."""
 
     first: Name
     second: Name
@@ -316,7 +319,7 @@ class ContactItem(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Forces(Message, frozen=True, kw_only=True):
-    """Forces of the control law at tick re_k, by term.
+    """Forces of the control law at tick re_k. Each term of the law is one force on all motors.
 
     The model publishes the constraint forces (thesis eqs. 5.11-5.17), the controller the user-defined terms.
     """
@@ -399,7 +402,7 @@ class Image(Message, frozen=True, kw_only=True):
 
 
 class Camera(Message, frozen=True, kw_only=True):
-    """Lens of a camera, and the encoders of the robot at the time t of the picture."""
+    """Properties of a camera's lens, and the encoder values of the robot at the time t of the picture."""
 
     stream: ClassVar[Stream] = Stream(
         "vision/camera/{camera}", "BULK", writers=("renderer",), readers=("vision",), when="with each picture"
@@ -499,7 +502,7 @@ class Event(Message, frozen=True, kw_only=True):
 class EStop(Message, frozen=True, kw_only=True):
     """Emergency stop. robot_sim latches it: all parts hold until the call `estop/rpc/reset`.
 
-    A message whose `set` is false releases nothing.
+    A message whose `set` is false releases nothing; it only reports that the stop was reset.
     """
 
     stream: ClassVar[Stream] = Stream(

@@ -21,7 +21,7 @@ class Request(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class Empty(Request, frozen=True, kw_only=True):
-    """A call without arguments."""
+    """The request of a call without arguments."""
 
 
 class Take(Request, frozen=True, kw_only=True):
@@ -86,7 +86,7 @@ class Pace(Request, frozen=True, kw_only=True):
 
 
 class Explore(Request, frozen=True, kw_only=True):
-    """Let an agent choose its next actions by another explorer."""
+    """Set the explorer (exploration strategy) by which an agent chooses its next actions."""
 
     explorer: Name  # exploration strategy, such as curious or random, as in the settings of an agent
 
@@ -207,7 +207,7 @@ class JacobianReply(Reply, frozen=True, kw_only=True):
 
 
 class Stat(Reply, frozen=True, kw_only=True):
-    """Status of a service."""
+    """Status of a service, the reply to the call `stat`."""
 
     who: Name  # name of the service
     instance: Name  # id of the process, as in its liveliness token
@@ -223,7 +223,7 @@ class Stat(Reply, frozen=True, kw_only=True):
 
 
 class Pulse(Reply, frozen=True, kw_only=True):
-    """Progress of a service's inbox; answered also while a handler runs."""
+    """Numbers that show whether a service still handles messages; the service replies also while a handler runs."""
 
     handled: int  # messages, calls and timers since the start
     waiting: int  # messages and calls in the inbox
@@ -245,7 +245,10 @@ class Failure(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """Calls with the same request and reply: their keys, who answers them, and who may call. Each is a row of the table in docs/bus.md."""
+    """Calls with the same request and reply: their keys, who answers them, and who may call.
+
+    Each `Call` is a row of the table in docs/bus.md.
+    """
 
     pattern: str  # the key, with variables in braces
     verbs: tuple[str, ...]  # words for {verb} in the pattern; empty if it has none

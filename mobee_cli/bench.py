@@ -35,9 +35,9 @@ class Bench:
     """
 
     text: str
-    quick: str | None = None  # help of --quick
+    quick: str | None = None
     figure: str | None = None  # help of --figure; drawn by experiments.bench.cost_figures
-    options: Mapping[str, Mapping[str, Any]] | None = None  # arguments of argparse's add_argument by option
+    options: Mapping[str, Mapping[str, Any]] | None = None
 
 
 def _rate(text: str) -> int:

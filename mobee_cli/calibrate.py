@@ -81,7 +81,8 @@ def run(arguments: argparse.Namespace) -> int:
 def rig_of(robot: Robot, marker: str, settings: CameraSettings) -> Rig:
     """Return the robot with its first two cameras and a tag on a marker, as calibration needs them.
 
-    Raises MobeeError if the robot has fewer than two cameras or no such marker.
+    `settings`: settings of the cameras, of which the lens is used. Raises MobeeError if the robot has fewer than two cameras or no such
+    marker.
     """
     cameras = cameras_of(robot)
     require_cameras(robot, cameras, STEREO)

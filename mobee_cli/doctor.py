@@ -53,7 +53,7 @@ class Finding:
     subject: str
     verdict: Verdict
     found: str
-    remedy: str = ""  # what to do about it
+    remedy: str = ""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

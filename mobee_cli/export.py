@@ -78,7 +78,7 @@ def run(arguments: argparse.Namespace) -> int:
 def write_csv(file: Path, records: Iterable[Record]) -> int:
     """Write transitions as CSV, one line for each, and return the number of lines.
 
-    `records`: transitions of one agent each. Lists are written as JSON; a cell is empty if the record lacks this column.
+    `records`: each contains the transitions of one agent. Lists are written as JSON; a cell is empty if a record lacks this column.
     """
     rows = 0
     with written_whole(file) as unfinished, unfinished.open("w", newline="") as sink:

@@ -103,8 +103,8 @@ frame, or None if it is not known."""
 def choose_hand(robot: Robot, position: Array | None, part: str | None, marker: str | None) -> Hand:
     """Return the hand that reaches for a target. If `part` or `marker` is None, it is chosen by the target and the robot.
 
-    `position`: of the target, (3,) m in the root frame; None: not known. Raises UnknownName for a part or marker that the robot does not
-    have, InvalidValue if no motor moves the marker.
+    `position`: position of the target, (3,) m in the root frame; None: not known. Raises UnknownName for a part or marker that the robot
+    does not have, InvalidValue if no motor moves the marker.
     """
     if part is not None:
         robot.part(part)

@@ -75,14 +75,18 @@ class LivePlant(BusPlant):
                 raise UserError(f"{error}. `mobee launch reach` starts a system in which no agent owns it.", FAILED) from None
 
     def act(self, part: str, target: Array) -> Outcome:
-        """Move a part to a target (n_part,) rad and return the outcome, as BusPlant does. Raises UserError after REACH_TIMEOUT (300 s)."""
+        """Set the part's attractor to `target` (n_part,) rad, wait until the part settles or times out, and return the outcome.
+
+        Raises UserError if this takes longer than REACH_TIMEOUT (300 s).
+        """
         with self._timeout(REACH_TIMEOUT, f"{part} {_TIMED_OUT}"):
             return super().act(part, target)
 
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
-        """Reach for the presented target with a marker and return the outcome, as BusPlant does.
+        """Pull a marker to the presented target by a force, and return the outcome.
 
-        Raises UserError after REACH_TIMEOUT (300 s).
+        Afterwards the attractor pulls the part back, or, with `stay`, the part stays where the force ended. Raises UserError if this takes
+        longer than REACH_TIMEOUT (300 s).
         """
         self._asked, self._heard, self._begun = time.monotonic(), np.inf, np.inf
         with self._timeout(REACH_TIMEOUT, f"{part} {_TIMED_OUT}"):

@@ -21,12 +21,12 @@ _COLUMNS = 80
 class Result:
     """The result of a reach.
 
-    `part`, `marker`: what reached; `why`: how they were chosen, empty if the user gave them. `outcome`: outcome of the reach. `nearest`:
-    the position nearest to the target that the marker can reach. `reward`: reward of the reach; `expected`: the reward that the agent
-    expected, None without an agent. `first_motion`: time from the request to the first command that moves the robot [s]; None offline.
-    `angle`: angle [rad] between the marker's normal and the direction to the target at the end; None if the marker need not face the
-    target. `path`: states to which the agent moved before the reach; empty without an agent. `avoided`: transitions (state, goal) that were
-    expected to fail.
+    `part`, `marker`: names of the part and of the marker that have reached. `why`: how they were chosen; empty if the user gave them.
+    `outcome`: outcome of the reach, as the plant reports it. `nearest`: the position nearest to the target that the marker can reach.
+    `reward`: reward of the reach. `expected`: the reward that the agent expected; None without an agent. `first_motion`: time from the
+    request to the first command that moves the robot [s]; None offline. `angle`: angle [rad] between the marker's normal and the direction
+    to the target at the end; None if the marker need not face the target. `path`: states to which the agent moved before the reach; empty
+    without an agent. `avoided`: transitions (state, goal) that were expected to fail.
     """
 
     part: str
@@ -58,7 +58,13 @@ class Result:
         return max(self.nearest.distance - self.target.radius, 0.0)
 
     def as_json(self) -> dict[str, Any]:
-        """Return the result as plain JSON data. Lengths are in m, angles in rad, times in s."""
+        """Return the result as plain JSON data. Lengths are in m, angles in rad, times in s.
+
+        "error": remaining distance to the aim, the centre or the surface of the target. "from_surface": distance from its surface.
+        "position": of the marker at the end. "nearest": position nearest to the target that the marker can reach, and its distance.
+        "avoided": transitions that were expected to fail. "settled": False if the part timed out. The other keys have the meaning of the
+        attributes of this class and of `outcome`.
+        """
         outcome = self.outcome
         return {
             "reached": self.reached,

@@ -38,20 +38,20 @@ STOP_TIME = 0.5  # s within which a stop is obeyed
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One rule.
+    """The check of one rule of the contract, which every robot_sim must keep.
 
-    `name`: of the check. `rule`: the requirement, as text. `test`: function that tests it with a part of the robot; raises Broken. `moves`:
-    whether the test arms the part.
+    `name`: name of the check. `rule`: the requirement, as text. `test`: function that tests the rule with a part of the robot, and raises
+    Broken if the robot breaks it. `moves`: whether the test arms the part, so that it may move.
     """
 
     name: str
     rule: str
     test: Callable[[Player, str], None]
-    moves: bool = False  # whether it arms the part
+    moves: bool = False
 
 
 def service(player: Player, part: str) -> None:
-    """Test the liveliness token of robot_sim, and the calls that every service answers (stat, config, pulse). Raises Broken."""
+    """Test that robot_sim has a liveliness token and answers the calls of every service (stat, config, pulse); raises Broken otherwise."""
     if not player.service.alive.get("robot_sim"):
         raise Broken("there is no liveliness token alive/robot_sim/INSTANCE: declare it after all subscriptions and calls")
     if len(player.service.alive["robot_sim"]) > 1:
@@ -64,7 +64,7 @@ def service(player: Player, part: str) -> None:
 
 
 def parts(player: Player, part: str) -> None:
-    """Test that the parts, their motors and the hash of the robot are those of the robot file. Raises Broken."""
+    """Test that the parts, their motors and the hash of the robot are those of the robot file; raises Broken otherwise."""
     robot = player.robot
     if set(player.tick.parts) != set(robot.parts):
         raise Broken(f"a tick has the parts {', '.join(player.tick.parts)}; the robot file has {', '.join(robot.parts)}")
@@ -77,7 +77,7 @@ def parts(player: Player, part: str) -> None:
 
 
 def streams(player: Player, part: str) -> None:
-    """Test that the tick, the clock and the states of all parts arrive and are valid messages. Raises Broken."""
+    """Test that the tick, the clock and the states of all parts arrive and are valid messages; raises Broken otherwise."""
     player.until(lambda: bool(player.ticks and player.clocks and all(player.states.values())), ANSWER)
     if player.refused:
         raise Broken(f"{len(player.refused)} messages are not valid, such as {player.refused[-1]}")
@@ -88,7 +88,7 @@ def streams(player: Player, part: str) -> None:
 
 
 def ticks(player: Player, part: str) -> None:
-    """Test the numbers, times and rate of the ticks that arrive in 1.5 s. Raises Broken."""
+    """Test that numbers, times and rate of the ticks of 1.5 s are those of the contract; raises Broken otherwise."""
     first = len(player.ticks)
     player.wait(OBSERVED)
     seen = player.ticks[first:]
@@ -111,7 +111,7 @@ def ticks(player: Player, part: str) -> None:
 
 
 def positions(player: Player, part: str) -> None:
-    """Test that all motor positions are within the limits of the robot file, with a tolerance of 5 degrees. Raises Broken."""
+    """Test that all motor positions are within the limits of the robot file, with a tolerance of 5 degrees; raises Broken otherwise."""
     low, high = player.robot.limits.T
     q = np.array(player.tick.q)
     beyond = np.maximum(q - high, low - q)
@@ -122,7 +122,7 @@ def positions(player: Player, part: str) -> None:
 
 
 def ownership(player: Player, part: str) -> None:
-    """Test the calls take, arm and release, and that only the owner of the part may use them. Raises Broken."""
+    """Test that take, arm and release work, that epochs grow, and that no other process can take an owned part; raises Broken otherwise."""
     first = player.take(part)
     if player.take(part) <= first:
         raise Broken(f"take returns epoch {player.epochs[part]} after {first}: each epoch must be larger than all before")
@@ -138,7 +138,7 @@ def ownership(player: Player, part: str) -> None:
 
 
 def hold(player: Player, part: str) -> None:
-    """Test that a part which is not armed does not move when it receives commands. Raises Broken."""
+    """Test that a part which is not armed does not move when it receives commands; raises Broken otherwise."""
     player.take(part)
     start = player.q(part)
     player.keep(part, "velocity", lambda: _speed(player, part), MOTION)
@@ -149,7 +149,7 @@ def hold(player: Player, part: str) -> None:
 
 
 def obeys(player: Player, part: str) -> None:
-    """Test that an armed part follows velocity commands and position commands. Raises Broken."""
+    """Test that an armed part follows velocity commands and position commands; raises Broken otherwise."""
     with player.armed(part):
         start, speed = player.q(part), _speed(player, part)
         player.keep(part, "velocity", lambda: speed, MOTION)
@@ -169,7 +169,7 @@ def obeys(player: Player, part: str) -> None:
 
 
 def refuses(player: Player, part: str) -> None:
-    """Test that invalid commands and commands for an old tick do not come into force. Raises Broken."""
+    """Test that invalid commands and commands for an old tick do not come into force; raises Broken otherwise."""
     n = len(player.robot.part(part))
     still, nan = np.zeros(n), np.full(n, math.nan)
     limits = player.robot.limits[player.robot.part(part).slice]
@@ -195,7 +195,7 @@ def refuses(player: Player, part: str) -> None:
 
 
 def watchdog(player: Player, part: str) -> None:
-    """Test that a part goes into hold when its commands stop, and then must be armed again before it moves. Raises Broken."""
+    """Test that a part goes into hold when its commands stop, and then must be armed again before it moves; raises Broken otherwise."""
     with player.armed(part):
         player.keep(part, "velocity", lambda: _speed(player, part), MOTION)
         if not player.until(lambda: player.status(part).gate == "hold", 1e-3 * TTL + STOP_TIME):
@@ -208,17 +208,17 @@ def watchdog(player: Player, part: str) -> None:
 
 
 def owner_gone(player: Player, part: str) -> None:
-    """Test that a part goes into hold when the liveliness token of its owner disappears. Raises Broken."""
+    """Test that a part goes into hold when the liveliness token of its owner disappears; raises Broken otherwise."""
     _hold_without(player, part, "controller", owner=True)
 
 
 def model_gone(player: Player, part: str) -> None:
-    """Test that the part goes into hold when the liveliness token of the model disappears. Raises Broken."""
+    """Test that the part goes into hold when the liveliness token of the model disappears; raises Broken otherwise."""
     _hold_without(player, part, "model", owner=False)
 
 
 def emergency_stop(player: Player, part: str) -> None:
-    """Test that an emergency stop stops all parts and stays in force until the call that resets it. Raises Broken."""
+    """Test that an emergency stop stops all parts and stays in force until the call that resets it; raises Broken otherwise."""
     with player.armed(part):
         player.keep(part, "velocity", lambda: _speed(player, part), MOTION)
         player.service.bus.publisher(EStop).put(set=True, source="conform", reason="test of the emergency stop")

@@ -38,8 +38,9 @@ class Broken(Exception):
 class Player:
     """Acts as the controller of a robot_sim under test, and records the messages that arrive.
 
-    `ticks`: with their monotonic times of arrival [s]. `clocks`, `stops`: messages. `states`: messages by part. `refused`: descriptions of
-    messages that are not valid. `epochs`: drive epoch in force, by part.
+    `ticks`: pairs of the monotonic time of arrival [s] and the `Tick` message. `clocks`, `stops`: the `Clock` and `EStop` messages.
+    `states`: lists of `State` messages, by part. `refused`: texts about messages that are not valid. `epochs`: epoch (number of the
+    ownership) of each part's drive that is in force, by part.
     """
 
     def __init__(self, service: Service, robot: Robot) -> None:
@@ -109,7 +110,10 @@ class Player:
     # Calls
 
     def call(self, key: str, request: type[Request], reply: type[_R], **fields: Any) -> _R:
-        """Call robot_sim as its controller, and return the reply. `fields`: of the request. Raises services.common.rpc.CallFailed."""
+        """Call robot_sim as its controller, and return the reply; raises services.common.rpc.CallFailed.
+
+        `request`, `reply`: types of request and reply. `fields`: fields of the request.
+        """
         return self.service.call(key, request, reply, timeout=ANSWER, **fields)
 
     def call_as_operator(self, key: str, request: type[Request], reply: type[_R]) -> _R:
@@ -124,13 +128,19 @@ class Player:
         return self.call(keys.service_rpc("robot_sim", "stat"), Empty, Stat)
 
     def take(self, part: str, instance: str = "") -> int:
-        """Take the drive of a part, and return the new epoch. `instance`: process that becomes the owner; empty: this one."""
+        """Take the drive of a part (the right to command its motors), and return its new epoch, the number of the ownership.
+
+        `instance`: id of the process that becomes the owner; empty: this one.
+        """
         taken = self.call(keys.drive(part, "take"), Take, Taken, instance=instance or self.service.instance)
         self.epochs[part] = taken.epoch
         return taken.epoch
 
     def drive(self, part: str, verb: str, epoch: int | None = None) -> str:
-        """Call arm, release or hold (`verb`) for a part, and return the new state of its gate. `epoch`: None: the epoch in force."""
+        """Call arm, release or hold (`verb`) for the drive of a part, and return the new state of its gate.
+
+        `epoch`: number of the ownership; None: the number in force.
+        """
         epoch = self.epochs[part] if epoch is None else epoch
         return self.call(keys.drive(part, verb), WithEpoch, Driven, epoch=epoch).gate
 

@@ -40,7 +40,7 @@ class Files:
 
 
 def write_files(setup: Setup, files: Files) -> None:
-    """Write the robot (unless it is a shipped one) and the scenario.
+    """Write the robot (unless it is a shipped one) and the scenario of a setup to their paths in `files`.
 
     Raises UserError if a file cannot be written, InvalidValue if the robot has properties that its file cannot express.
     """

@@ -35,8 +35,8 @@ class Learning:
 
     plant: OfflinePlant
     agents: tuple[CuriousAgent, ...]
-    begun: int  # transitions that were on record at the start
-    seconds: float = 0.0  # s of real time
+    begun: int
+    seconds: float = 0.0
 
     @property
     def touched(self) -> Counter[str]:
@@ -54,7 +54,13 @@ class Learning:
         return sum(len(_made(agent)) for agent in self.agents)
 
     def numbers(self) -> dict[str, Any]:
-        """Return the numbers of transitions, times, contacts and results of each agent, as plain JSON data."""
+        """Return the numbers of the learning so far, as plain JSON data.
+
+        "transitions", "transitions_ever": number made by this process, and with those of earlier processes. "robot_time_s", "real_time_s":
+        simulated and real time. "touched": number of actions that ended in contact with each object, by name. "agents": for each part, a
+        dict with "joints" (names), "states", "state_actions", "tried" (state-actions that were tried), "missed_goal" (state-actions that
+        missed their goal at least once) and "transitions".
+        """
         return {
             "transitions": self.transitions,
             "transitions_ever": self.transitions + self.begun,

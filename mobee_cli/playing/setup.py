@@ -43,12 +43,15 @@ class Setup:
     gains: str
     agents: dict[str, AgentConfig]
     lines: tuple[str, ...]
-    cameras: tuple[str, ...] = ()  # beside those of the robot
-    eyes: tuple[str, ...] = ()  # services of the cameras
+    cameras: tuple[str, ...] = ()
+    eyes: tuple[str, ...] = ()
 
     @property
     def law(self) -> Gains:
-        """The gains of the control law that `gains` names."""
+        """The gains of the control law, looked up by the name in the attribute `gains`: "default", "derived" or "published_2014".
+
+        Raises UnknownName if there is no such name.
+        """
         return Gains.named(self.gains)
 
 
@@ -61,9 +64,10 @@ def add_setup_options(parser: argparse.ArgumentParser) -> None:
 
 
 def setup_of(arguments: argparse.Namespace, robot: str) -> Setup:
-    """Return the setup for a robot, a name or path as for `mobee.load_robot`, and the options of the command.
+    """Return the setup of agents for a robot.
 
-    Raises MobeeError if it cannot be made.
+    `arguments`: the options of the command. `robot`: name or path of the robot, as `mobee.load_robot` takes it. Raises MobeeError if the
+    setup cannot be made.
     """
     options = {name: value for name, value in urdf_options(arguments).items() if value is not None}
     parts = _parts(arguments.parts)

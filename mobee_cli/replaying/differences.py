@@ -109,7 +109,7 @@ class Compared:
     ticks: int
     messages: int
     difference: Difference | None
-    ends: str  # which of them ends first, "" if both are equally long
+    ends: str
 
 
 def compare_runs(first: Recording, second: Recording) -> Compared:

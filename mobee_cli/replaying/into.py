@@ -34,15 +34,15 @@ _NO_INPUT = ("/rpc/mark", "/rpc/shutdown")  # calls that change no result
 class Role:
     """The messages that a service reads and sends in a tick, as names of message types.
 
-    `with_tick`: messages of the model, sent to the service after the tick, which it needs to answer the tick. `after`: messages of others,
-    sent before the next tick. `says`: messages of the service that are compared. `answers`: whether a message is the service's answer to a
-    tick.
+    `with_tick`: messages of the model that the service needs to answer a tick; they are played right after the tick. `after`: messages of
+    other services, played before the next tick. `says`: messages of the service that are compared. `answers`: function that returns whether
+    a message is the service's answer to a tick.
     """
 
-    with_tick: tuple[str, ...]  # from the model, after the tick: it answers the tick when it has these
-    after: tuple[str, ...]  # from others, before the next tick
-    says: tuple[str, ...]  # the compared values
-    answers: Callable[[Item], bool]  # whether a message ends its work on a tick
+    with_tick: tuple[str, ...]
+    after: tuple[str, ...]
+    says: tuple[str, ...]
+    answers: Callable[[Item], bool]
 
 
 def _is_controllers_answer(item: Item) -> bool:
@@ -69,7 +69,7 @@ class Result:
     calls: int = 0
     seconds: float = 0.0
     difference: Difference | None = None
-    says: dict[str, int] = field(default_factory=dict)  # messages compared, by type
+    says: dict[str, int] = field(default_factory=dict)
 
 
 def replay_into(stage: Stage, run: Iterable[TickOf], last: int) -> Result:

@@ -34,7 +34,10 @@ class Stopped(MobeeError):
 
 
 class Stage:
-    """A separate bus with one service on it. `who`: the service. `said`: queue of the messages that it publishes."""
+    """A separate bus with one service on it, for the replay of a recording.
+
+    `who`: name of the service. `said`: queue of the messages that the service publishes.
+    """
 
     def __init__(self, who: str, settings: str, folder: Path) -> None:
         """Prepare the stage.
@@ -67,7 +70,10 @@ class Stage:
                 self._end()
 
     def start(self) -> None:
-        """Start the service with its settings, and wait until it is ready. Raises Stopped if it ends, or is not ready within 60 s."""
+        """Start the service with its settings in the recorded run, and wait until it is ready.
+
+        Raises Stopped if it ends, or is not ready within 60 s.
+        """
         entry = entry_of(self.who, None)
         assert entry is not None
         file = self._folder / f"{self.who}.toml"
@@ -122,9 +128,10 @@ class Stage:
         self._kept.append(answer_raw(self.session, key, reply))
 
     def call(self, key: str, kind: str, request: bytes) -> tuple[str, bytes]:
-        """Make a recorded call to the service, and return the encoding and the bytes of the answer.
+        """Make a recorded call to the service, and return the encoding string and the bytes of the answer.
 
-        `key`: of the call. `kind`: name of the request's type. `request`: its bytes. Raises Stopped if there is no answer within 10 s.
+        `key`: key of the call. `kind`: name of the request's type. `request`: bytes of the request. Raises Stopped if there is no answer
+        within 10 s.
         """
         answer = call_raw(self.session, key, f"application/msgpack;icub/{kind}/{VERSION}", request, PATIENCE)
         if answer is None:

@@ -66,7 +66,10 @@ class TickOf:
     items: list[Item] = field(default_factory=list)
 
     def of(self, kind: str, src: str = "") -> list[Item]:
-        """Return the messages of the type `kind`. `src`: only those of this sender; empty: of every sender."""
+        """Return the messages of this tick that have the type `kind`.
+
+        `src`: name of the sender; empty: messages of every sender are returned.
+        """
         return [item for item in self.items if item.type == kind and src in ("", item.src)]
 
 

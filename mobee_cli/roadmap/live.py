@@ -44,9 +44,10 @@ TRIES = 3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Running:
-    """The running system.
+    """The running system, to which this program is connected.
 
-    `robot`: its robot. `world`: objects of its model. `gains`: of its controller. `service`: this program's connection to the bus.
+    `robot`: the robot of the system. `world`: objects in the world of its model. `gains`: gains of its controller. `service`: this
+    program's connection to the bus.
     """
 
     robot: Robot

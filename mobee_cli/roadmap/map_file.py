@@ -86,7 +86,10 @@ def wrapped(text: str, indent: str = "") -> list[str]:
 
 
 def summary(trm: Roadmap, path: Path) -> list[str]:
-    """Return lines of text that describe a roadmap: its size, robot and world, settings and task coordinates. `path`: of its file."""
+    """Return lines of text that describe a roadmap: its size, robot and world, settings and task coordinates.
+
+    `path`: path of the roadmap's file.
+    """
     settings = trm.settings
     parts = np.bincount(trm.graph.components) if len(trm.q) else np.empty(0, dtype=int)
     unfinished = "" if settings.get("finished", True) else ", unfinished: the same build command resumes it"
@@ -126,7 +129,12 @@ def edge_summary(trm: Roadmap) -> list[str]:
 
 
 def as_json(trm: Roadmap, path: Path) -> dict[str, Any]:
-    """Return a description of a roadmap as plain JSON data. `path`: of its file."""
+    """Return a description of a roadmap as plain JSON data. `path`: path of the roadmap's file.
+
+    "poses", "edges": number of poses and of edges. "parts": number of poses of each connected part. "names", "spacing", "low", "high":
+    name, distance between vertices, smallest and largest value of each task coordinate. "settings": settings with which the roadmap was
+    built.
+    """
     return {
         "map": str(path),
         "poses": len(trm.q),

@@ -13,7 +13,7 @@ from services.common.service import Service
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Run an agent until it is stopped, or has made its transitions or problem-tries."""
+    """Run an agent until it is stopped, or has made the configured number of transitions, or of attempts to reach a target."""
     config = load_config(Config, argv, "services.agents")
     with explained("services.agents"):
         robot = robot_of(config)

@@ -68,14 +68,14 @@ class Config(LearningConfig, frozen=True, kw_only=True):
     """Motors that span the state space. Empty: those that `levels` names; if it names none, all motors of the part, or shoulder and elbow
     of a part that has a motor called elbow."""
     levels: tuple[float, ...] | Mapping[str, tuple[float, ...]] = (0.25, 0.5, 0.75)
-    """Fractions of each joint's range at which the samples lie; or the fractions for each joint, as { l_elbow = [0.5, 0.8] }."""
+    """Fractions of each joint's range at which the states lie; or the fractions for each joint, as { l_elbow = [0.5, 0.8] }."""
     neighbours: Annotated[int, Meta(ge=0)] | Literal["equidistant"] = 0
     """Number of nearest states to which each state has actions, or "equidistant": the states one step away along one joint. 0: the
     published numbers, 8 for the torso and 16 for an arm."""
     tie_seed: int = 0
     """Seed of the random choice among neighbours at the same distance."""
     goal: tuple[Annotated[int, Meta(ge=0)], ...] = ()
-    """States in which every action is rewarded; empty: there is no such reward, only the information gain."""
+    """Numbers of the states in which every action is rewarded; empty: there is no such reward, only the information gain."""
     goal_weight: float = 0.0
     """Reward of an action in a state of `goal`, nats, which is added to the information gain; 0: the reward is 1 and replaces the
     information gain."""
@@ -93,8 +93,8 @@ class Config(LearningConfig, frozen=True, kw_only=True):
     cells: tuple[int, int] = (3, 3)
     """Number of cells along x and along y into which the area is divided. A state contains the cell in which the object is."""
     aside: Annotated[int, Meta(ge=0)] = 0
-    """Number of the posture to which the part moves when the object is not seen. In this posture the robot must not hide the object, and
-    must leave room for it."""
+    """Number, from 0, of the posture of the state space to which the part moves when the object is not seen. In this posture the robot must
+    not hide the object, and must leave room for it."""
     put_back: tuple[float, ...] = ()
     """Position, m, root frame, at which the simulator sets the object down when it is not seen from `aside` either; empty: a person puts it
     back."""
@@ -109,7 +109,7 @@ class Config(LearningConfig, frozen=True, kw_only=True):
     learned: str = ""
     """Folder of a run whose transitions are used to plan paths to reaches; empty: the agent assumes that most actions reach their goals."""
     tries: Annotated[int, Meta(ge=0)] = 0
-    """Number of problem-tries after which the agent ends; 0: no limit."""
+    """Number of problem-tries (attempts to reach one target) after which the agent ends; 0: no limit."""
 
     def check_robot(self, robot: Robot) -> None:
         """Check the settings for the robot.

@@ -32,9 +32,10 @@ from services.common.service import CallRefused, Service
 
 
 class Work:
-    """The main loop of an agent's process. It counts the interruptions of actions since the last measurement began.
+    """The main loop of an agent's process.
 
-    On request the agent rests: it releases the goal of its part, so that another client can move the part, until it is asked to continue.
+    `interrupted`: number of interrupted actions since the launcher last began a measurement. On request the agent rests: it releases the
+    goal of its part, so that another client can move the part, until it is asked to continue.
     """
 
     def __init__(self, service: Service, plant: BusPlant, part: str) -> None:
@@ -46,7 +47,8 @@ class Work:
     def run(self, resumed: str, enough: Callable[[], bool], step: Callable[[], None]) -> None:
         """Call `step` until `enough()` returns True, and answer calls between the steps.
 
-        `resumed`: text of the event that a run continues; empty for a new run.
+        If an action is interrupted, this is counted and published as an event, and the next step begins. `resumed`: text of the event by
+        which the user learns that the agent continues from stored transitions; empty if it begins without any.
         """
         self._service.ready()
         if resumed:
@@ -75,7 +77,10 @@ class Work:
 
 
 class AgentNode:
-    """Runs a curious agent on the live plant. Every transition is on disk before the next action begins, if the run has a folder."""
+    """Runs a curious agent on the live plant, the running robot.
+
+    If the run has a folder, every transition is on disk before the next action begins.
+    """
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:
         self._config = config
@@ -168,7 +173,10 @@ class AgentNode:
 
 
 class ReachNode:
-    """Runs an agent that learns to reach on the live plant. Every step is on disk before the next one, if the run has a folder."""
+    """Runs an agent that learns to reach on the live plant, the running robot.
+
+    If the run has a folder, every step (a transition or a reach) is on disk before the next one begins.
+    """
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:
         self._config = config
@@ -195,7 +203,7 @@ class ReachNode:
         service.mark, service.describe = self._mark, self._describe
 
     def run(self) -> None:
-        """Make problem-tries until the configured number is made; 0: without end."""
+        """Make problem-tries (attempts to reach one target) until the configured number is made; 0: without end."""
         agent, wanted = self._agent, self._config.tries
         resumed = f"{self._config.part} continues after {agent.tries} problem-tries" if agent.steps else ""
         self._work.run(resumed, lambda: 0 < wanted <= agent.tries, self._try)

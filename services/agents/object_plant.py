@@ -28,9 +28,9 @@ PATIENCE = 10.0  # s of the robot's clock after which the simulator is asked aga
 class ObjectPlant(PerceivingPlant):
     """A live plant that perceives one object, and completes each action by looking at this object.
 
-    Pictures that were taken before the end of the motion do not count. If the object is not seen, the part moves to the posture `aside`,
-    and the action ends there. If the object is not seen in its area from there either, it has fallen or left: the simulator, or a person,
-    puts it back, and the action ends when it is back. So an outcome always holds what was seen after the action.
+    Pictures that were taken before the end of the motion do not count. If the object is not seen, the part moves to the posture `aside` of
+    the settings, and the action ends there. If the object is not seen in its area from there either, it has fallen or left: the simulator,
+    or a person, puts it back, and the action ends when it is back. So an outcome always holds what was seen after the action.
 
     Args:
         service: the service of the agent.

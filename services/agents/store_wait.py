@@ -16,9 +16,10 @@ PREDECESSOR = 15.0  # s for which another process may write this agent's data: a
 
 
 class StoreWait:
-    """Repeats a call that the store refuses, until the store accepts it. Between the tries it answers calls of other services.
+    """Repeats an access to the file of an agent's transitions (its store) until the access succeeds.
 
-    The part keeps its position meanwhile.
+    The store refuses access while the disk is full, or while an earlier process of the agent still writes. Between the tries the calls of
+    other services are answered, and the agent's part keeps its position.
     """
 
     def __init__(self, service: Service) -> None:
@@ -52,7 +53,7 @@ class StoreWait:
         return result
 
     def let_append_wait(self, store: Any) -> None:
-        """Replace the method `append` of a store by one that waits as `until_accepted` does."""
+        """Replace the method `append` of a store by one that is repeated until the store accepts the data, as by `until_accepted`."""
         append = store.append
         store.append = lambda *data: self.until_accepted(lambda: append(*data))
 

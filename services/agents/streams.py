@@ -33,7 +33,7 @@ def publish_transition(
     """Publish a transition, the n-th of its agent.
 
     `space`: the state space of the agent. `value`: V(s), the value of the state before the action, by the plan that chose the action.
-    `probability`: that of the observed next state, as the agent believed before the action.
+    `probability`: probability of the observed next state by the agent's model before the action.
     """
     stream.put(
         agent=space.part,
@@ -93,7 +93,7 @@ def _likeliest(beliefs: OutcomeModel, s: int, a: int) -> tuple[int, float]:
 
 
 class LearnedStream:
-    """Publishes a `Learned` message after a transition, at most every 0.5 s of real time."""
+    """Publishes a `Learned` message (counts, rewards and values of all actions) after a transition, at most every 0.5 s of real time."""
 
     def __init__(self, bus: Bus, model: TransitionModel) -> None:
         """`model`: the transition model of the agent."""
@@ -103,7 +103,7 @@ class LearnedStream:
         self._next = -np.inf  # s, monotonic clock
 
     def put(self, n: int, s: int, numbers: Callable[[], tuple[Array, Array]]) -> None:
-        """Publish a `Learned` message if the last one is old enough.
+        """Publish a `Learned` message if the last one is at least 0.5 s old.
 
         `n`: number of transitions that the agent has observed. `s`: its present state. `numbers`: called only for a message that is
         published; returns rewards and values of all state-actions, (S, A) each.
@@ -128,7 +128,8 @@ class LearnedStream:
 def surprises(model: TransitionModel) -> list[Surprise]:
     """Return the observed outcomes that differ from the goals of their actions, each with its share of the tries of the action.
 
-    Imagined (initial) outcomes do not count. There are at most MAX_SURPRISES (2000), those with the largest shares.
+    Imagined outcomes, which are pseudo-counts from before the first try, do not count. At most MAX_SURPRISES (2000) outcomes are returned,
+    those with the largest shares.
     """
     real = np.where(model.counts > 0.0, model.counts - model.imagined, 0.0)
     unexpected = (real > 0.0) & (model.outcomes != model.space.goals[:, :, None])
@@ -140,9 +141,9 @@ def surprises(model: TransitionModel) -> list[Surprise]:
 
 
 class ReachStream:
-    """Publishes the transitions of an agent that learns to reach, and `Learned` messages from their counts.
+    """Publishes the transitions of an agent that learns to reach, and `Learned` messages with their counts and with rewards and values.
 
-    The controller publishes the reaches themselves (`Reach`).
+    The reaches are not published here: the controller publishes a `Reach` message for each.
     """
 
     def __init__(self, bus: Bus, agent: ReachAgent) -> None:
@@ -153,7 +154,7 @@ class ReachStream:
         self._learned = LearnedStream(bus, self._seen)
 
     def put(self, step: Step, target: ReachTarget, plan: tuple[Array, Array]) -> None:
-        """Publish a step towards a target.
+        """Publish a step of the agent towards the target `target`, and count it.
 
         `plan`: values V (S,) and Q (S, A + 1) of the plan that chose the step; the last column of Q is the action of reaching. A step that
         is a reach is not a transition, and is not published as one.

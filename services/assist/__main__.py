@@ -11,7 +11,7 @@ from services.common.service import run_node
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Run the torso assist until a signal or a shutdown call."""
+    """Run the torso assist, which moves the torso so that an arm can reach a target well, until a signal or a shutdown call."""
     run_node("services.assist", Config, AssistNode, argv)
 
 

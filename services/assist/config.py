@@ -22,7 +22,7 @@ LEARNED_LEVELS = 5  # positions of each motor that are compared by a learned map
 
 
 class Config(BehaviourConfig, frozen=True, kw_only=True):
-    """The torso assist's settings."""
+    """The settings of the torso assist, which moves the torso so that an arm can reach a target well."""
 
     part: str = "torso"
     """Part that the assist moves; it carries the arm."""
@@ -37,15 +37,16 @@ class Config(BehaviourConfig, frozen=True, kw_only=True):
     """Speed of the part, as a share of the motors' highest speed (0 to 1)."""
 
     def check_robot(self, robot: Robot) -> None:
-        """Check the settings, and that the part carries the arm and the run `learned` can be read.
+        """Raise MobeeError if the settings do not fit the robot.
 
-        Raises MobeeError if they do not fit the robot.
+        This is so if the part does not carry the arm, if the run `learned` cannot be read, or if the name of a part cannot be used in keys
+        of the bus.
         """
         super().check_robot(robot)
         self.assist(robot)
 
     def assist(self, robot: Robot) -> Assist:
-        """Return the object that chooses the postures of the part, by a learned map or by manipulability.
+        """Return the object that chooses the postures of the part, by the learned rewards of the run `learned` or by manipulability.
 
         Raises MobeeError if the settings do not fit the robot, or the run `learned` cannot be read.
         """

@@ -27,7 +27,7 @@ def access_list(identities: Mapping[str, Party], namespace: str, clients: str = 
     Args:
         identities: the party of each identity, by the name in its certificate.
         namespace: prefix of all keys of the robot.
-        clients: prefix of the keys of the filtered robot; empty if there is none.
+        clients: prefix of the keys under which the port filter's clients find the robot; empty if there is no port filter.
     """
     rules = [_rule("to all", "egress", _TO_CLIENTS, ("**", f"**/{_HISTORY}/**"))]
     subjects: list[dict[str, object]] = []

@@ -28,7 +28,7 @@ LONGEST_STEP = 0.1  # s: after a longer gap between two ticks the motion continu
 
 
 class BehaviourConfig(ServiceConfig, frozen=True, kw_only=True):
-    """Settings that every behaviour has."""
+    """Settings that every behaviour has; a behaviour is a service that moves one part by the position of a target."""
 
     part: str = ""
     """Part that the behaviour moves."""
@@ -51,21 +51,25 @@ class BehaviourConfig(ServiceConfig, frozen=True, kw_only=True):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """What a behaviour perceives in one step; positions and velocities are those at the tick, in the root frame."""
+    """What a behaviour perceives in one step, at the time of a tick.
 
-    q: Array  # (n,) rad, encoders
-    velocity: Array  # (n,) rad/s, as commanded
-    place: Array  # (3,) m, position of the target
-    place_velocity: Array  # (3,) m/s, velocity of the target
-    dt: float  # s since the last step
+    `q`, `velocity`: encoder values (n,) rad and commanded velocities (n,) rad/s of all motors. `place`, `place_velocity`: position (3,) m
+    and velocity (3,) m/s of the target, root frame. `dt`: time since the last step, s.
+    """
+
+    q: Array
+    velocity: Array
+    place: Array
+    place_velocity: Array
+    dt: float
 
 
 class Behaviour:
-    """Runs a behaviour: in each step, moves the attractor of its part to what the function `step` returns.
+    """Runs a behaviour: in each step, moves the attractor of its part (the posture to which the part moves) as the function `step` says.
 
     `step(scene)`: returns the attractor (n_part,) rad and its velocity (n_part,) rad/s. `reset()`: ends the present motion. If the target
-    has no new position for the time `patience` of the settings, the part holds; with `watches_last_place`, the behaviour continues instead
-    as if the target were at rest at its last position.
+    has no new position for the time `patience` of the settings, the part holds; if `watches_last_place` is True, the behaviour continues
+    instead as if the target were at rest at its last position.
     """
 
     def __init__(
@@ -99,7 +103,11 @@ class Behaviour:
         return f"pauses: {self._pause}" if self._pause else f"follows {self._config.target}"
 
     def numbers(self) -> Mapping[str, float]:
-        """Return the numbers for `stat` since the last `mark`: steps, follows (1 or 0), and percentiles of the time of a step [ms]."""
+        """Return the numbers of the current measurement, by name, for the call `stat`.
+
+        "steps": number of steps since the last `mark`. "follows": whether the part follows the target now. "step_ms_p50", "step_ms_p99":
+        percentiles of the computing time of a step [ms]; -1: there was no step.
+        """
         times = {f"step_ms_p{p}": self._times.at(p) if self._steps else NOT_MEASURED for p in (50, 99)}
         return {"steps": self._steps, "follows": not self._pause, **times}
 

@@ -117,9 +117,10 @@ class Latest(Generic[_M]):
 
 
 def part_of(cls: type[Message], name: str) -> str | None:
-    """Return the part whose number of motors the vectors of a message must have: `name`, if the key of `cls` has the variable {part}.
+    """Return the name of the part to which messages of the type `cls` belong, if their key contains a part; otherwise None.
 
-    None if the key has no part, or if `name` is * (any part); the lengths are then not checked.
+    The vectors of such a message must have one number for each motor of that part. `name`: the variable in the key. The result is None, so
+    that lengths are not checked, also if `name` is * (any part).
     """
     return name if cls.stream.variable == "part" and name != "*" else None
 
@@ -127,8 +128,8 @@ def part_of(cls: type[Message], name: str) -> str | None:
 def other_key(received: zenoh.Sample | zenoh.Query) -> str:
     """Return the key under which a message or call was sent, if it has arrived under another key; otherwise an empty text.
 
-    Each sender attaches the key. Zenoh sends numbers in place of keys; when a connection ends and a new one begins, a number can stand for
-    another key for a moment.
+    Each sender attaches the key, because Zenoh transmits numbers in place of keys: just after a connection has ended and a new one has
+    begun, a number can stand for another key. If the attached key is empty, the result is "nothing"; if none is attached, it is empty.
     """
     attached = received.attachment
     if attached is None or (sent := attached.to_bytes()) == str(received.key_expr).encode():
@@ -186,7 +187,7 @@ class Bus:
         return Latest(self, cls.stream.keys(name), cls, part_of(cls, name))
 
     def receive(self, cls: type[_M], sample: zenoh.Sample, part: str | None = None, *, any_run: bool = False) -> _M | None:
-        """Return the message of the type `cls` in a sample of Zenoh; None if it is refused, which is counted and reported.
+        """Return the message of the type `cls` in a sample of Zenoh; None if it is refused, which is counted and published as a warning.
 
         `part`: the part whose number of motors the vectors must have; None: not checked. `any_run`: accept also a message of another run of
         robot_sim. Before the first clock message the run is not known: without `any_run` the result is then None, and nothing is counted.
@@ -207,7 +208,7 @@ class Bus:
         return message
 
     def reject(self, reason: str, text: str) -> None:
-        """Count a refused message or call under `reason`, and report `text` at most once per second and reason."""
+        """Count a refused message or call under `reason`, and publish `text` as a warning, at most once per second for each reason."""
         self.rejected[reason] += 1
         now = time.monotonic()
         if now - self._reported.get(reason, -1.0) >= 1.0:
@@ -215,7 +216,7 @@ class Bus:
             self.event("warning", "refused", text, reason=float(self.rejected[reason]))
 
     def guarded(self, what: str, handle: Callable[[], object]) -> None:
-        """Run `handle`; if it raises an unexpected exception, count, report and log this, and let the process continue.
+        """Run `handle`; if it raises an unexpected exception, count and log it, publish a warning, and let the process continue.
 
         `what`: name of the stream or call, for the report. A MobeeError is not caught: it ends the process.
         """
@@ -227,7 +228,7 @@ class Bus:
             self.report_defect(what, error)
 
     def report_defect(self, what: str, error: Exception) -> str:
-        """Count, report and log that the handler of a stream or call has failed with `error`; return the text of the report.
+        """Record that the handler of a stream or call has failed with `error`: count and log it, publish a warning; return its text.
 
         `what`: name of the stream or call.
         """

@@ -60,9 +60,10 @@ class BusFollower(BusPlant):
             raise MobeeError(f"{', '.join(moving())}: still moving after {TAKE_TIMEOUT:g} s; `mobee status` shows which process moves it")
 
     def take(self, parts: Sequence[str]) -> None:
-        """Take the ownership of the goals of `parts`, and wait until these parts are under control.
+        """Take the ownership of the goals of `parts` (the right to set their attractors), and wait until these parts are under control.
 
-        Raises MobeeError if a part is still in hold after TAKE_TIMEOUT (8 s), or if its goal belongs to another service.
+        A part is under control when robot_sim follows the controller's commands to it. Raises MobeeError if a part is still in hold after
+        TAKE_TIMEOUT (8 s), or if its goal belongs to another service.
         """
         give_up = time.monotonic() + TAKE_TIMEOUT
         while not self._has(parts):

@@ -58,9 +58,10 @@ class ReachClient:
     def present_object(self, name: str, aim: Aim = "centre", normal: Array | None = None, faces: bool = False) -> ReachTarget:
         """Use the object `name` of the model's world as target, also while it moves; return the target at its present position.
 
-        `aim`, `normal`, `faces`: as in `mobee.reach.ReachTarget`. Raises UnknownName if there is no such object; InvalidValue if the object
-        is stale, that is, not seen any more, or if its role is not target, because it then repels hands; ActionInterrupted if the model
-        does not answer.
+        `aim`: the marker has to reach the "centre" or the "surface" of the target. `normal`: desired direction (3,) of the marker's normal,
+        root frame; None: any. `faces`: True: the normal has to point at the target. Raises UnknownName if there is no such object;
+        InvalidValue if the object is stale, that is, not seen any more, or if its role is not target, because it then repels hands;
+        ActionInterrupted if the model does not answer.
         """
         found = self._known(name)
         if found.role != "target":
@@ -201,8 +202,9 @@ class Sent:
 class BusPlant:
     """The live robot as a plant (`mobee.reach.ReachPlant`): acts and reaches with some parts through controller and model on the bus.
 
-    While it waits, the service answers calls. In lockstep it also answers ticks for its service: a tick that waits for a decision of this
-    service is answered when the service waits again, so that the decision is made within that tick however long it takes.
+    To move a part, it takes the part's goal, which is the right to set the part's attractor, the posture to which the controller moves the
+    part. While it waits, the service answers calls. In lockstep it also answers ticks for its service: a tick that waits for a decision of
+    this service is answered when the service waits again, so that the decision is made within that tick however long it takes.
     """
 
     def __init__(self, service: Service, robot: Robot, parts: tuple[str, ...]) -> None:
@@ -244,8 +246,9 @@ class BusPlant:
     def measure(self, part: str) -> Array:
         """Return the part's motor positions, (n_part,) rad, by the encoders.
 
-        First takes the goal of the part, if this service does not own it, and waits until the part is under control. Raises
-        ActionInterrupted while this service rests, MobeeError if the goal belongs to another service for more than OWNED_PATIENCE (3 s).
+        First takes the goal of the part (the right to set its attractor), if this service does not own it, and waits until the controller
+        has the part under control, that is, until robot_sim follows its commands. Raises ActionInterrupted while this service rests
+        (between `rest` and `resume`), MobeeError if the goal belongs to another service for more than OWNED_PATIENCE (3 s).
         """
         self._require_awake(part)
         self._wanted.add(part)
@@ -277,8 +280,10 @@ class BusPlant:
     def present_object(self, name: str, aim: Aim = "centre", normal: Array | None = None, faces: bool = False) -> ReachTarget:
         """Use the object `name` of the model's world as target, also while it moves; return the target at its present position.
 
-        `aim`, `normal`, `faces`: as in `mobee.reach.ReachTarget`. Raises UnknownName if there is no such object; InvalidValue if it is
-        stale, that is, not seen any more, or if its role is not target; ActionInterrupted if the model does not answer.
+        `aim`: the marker has to reach the "centre" or the "surface" of the target. `normal`: desired direction (3,) of the marker's normal,
+        root frame; None: any. `faces`: True: the normal has to point at the target. Raises UnknownName if there is no such object;
+        InvalidValue if it is stale, that is, not seen any more, or if its role is not target; ActionInterrupted if the model does not
+        answer.
         """
         return self._reaches.present_object(name, aim, normal, faces)
 
@@ -304,7 +309,7 @@ class BusPlant:
 
         Then the attractor pulls the part back, or, with `stay`, the part stays where the force ended. Implements
         `mobee.reach.ReachPlant.reach`. Raises InvalidValue if no target is presented or the part does not move the marker;
-        ActionInterrupted as `act`.
+        ActionInterrupted on a hold, a fault or a new run, if the controller ends, and if it gives the goal to another service.
         """
         self.robot.marker(marker)
         sent = self._perform(part, "reach", ReachFor, marker=marker, stay=stay, **self._reaches.asked())
@@ -391,9 +396,9 @@ class BusPlant:
         self._is_resting = False
 
     def idle(self) -> bool:
-        """Return whether this plant rests, as after `rest`.
+        """Return whether this plant rests, that is, `rest` was called and `resume` was not called since.
 
-        If it does, first wait until the rest ends, for at most 0.2 s (RETRY_PERIOD).
+        If it rests, first wait until the rest ends, for at most 0.2 s (RETRY_PERIOD).
         """
         if self._is_resting:
             self._service.check_router()

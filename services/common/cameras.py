@@ -25,7 +25,7 @@ class CameraConfig(ServiceConfig, frozen=True, kw_only=True):
     link or marker, a position in m and a direction of view in its frame."""
 
     def check_robot(self, robot: Robot) -> None:
-        """Check the robot as every service does, and that all cameras can be made; raises MobeeError."""
+        """Raise MobeeError if a camera cannot be made, or if the name of a part cannot be used in keys of the bus."""
         super().check_robot(robot)
         self.cameras_on(robot)
 
@@ -35,7 +35,10 @@ class CameraConfig(ServiceConfig, frozen=True, kw_only=True):
 
 
 def require_cameras(robot: Robot, cameras: dict[str, Camera], count: int) -> None:
-    """Raise InvalidValue if the robot has fewer than `count` cameras; the message names the remedies. `cameras`: its cameras by name."""
+    """Raise InvalidValue if the robot has fewer than `count` cameras; the message says how to add one.
+
+    `cameras`: the robot's cameras by name.
+    """
     if len(cameras) >= count:
         return
     has = f"it has {', '.join(cameras) or 'none'}"

@@ -34,11 +34,11 @@ _NAME = re.compile(r"[a-z0-9_]{1,64}")
 
 @dataclass(frozen=True, slots=True)
 class Issued:
-    """What the certificate of an identity says."""
+    """What the certificate of an identity says: its name, its party (role on the bus; None: the router), and until when it is valid."""
 
     name: str
-    party: Party | None  # None: the router
-    until: datetime.datetime  # the end of its validity
+    party: Party | None
+    until: datetime.datetime
 
     def days_left(self, now: datetime.datetime | None = None) -> int:
         """Return the number of whole days until the certificate expires; negative if it has expired. `now`: None: the present time."""
@@ -56,7 +56,7 @@ class KeyFolder:
         """Make an authority, and a key and a certificate for each identity, in a new or empty folder; return the folder.
 
         `identities`: pairs of name and party, with the party None for the router. `days`: number of days for which their certificates are
-        valid. Raises BadKeys if the folder holds files; OSError.
+        valid. Raises BadKeys if the folder holds files, OSError if it cannot be written.
         """
         if path.exists() and any(path.iterdir()):
             raise BadKeys(
@@ -82,7 +82,7 @@ class KeyFolder:
         """Make a key and a certificate for each identity, or replace old ones.
 
         `identities`: pairs of name and party, with the party None for the router. `days`: number of days for which the certificates are
-        valid. Raises BadKeys if a name is not valid, or if the key of the authority is missing; OSError.
+        valid. Raises BadKeys if a name is not valid, or if the key of the authority is missing; OSError if a file cannot be written.
         """
         authority, key = self._authority(), self._authority_key()
         for name, party in identities:
@@ -111,7 +111,10 @@ class KeyFolder:
         return [_checked(path, authority) for path in paths]
 
     def require(self, names: Iterable[str]) -> None:
-        """Raise BadKeys for the first of the identities `names` whose key or certificate is missing, not safe or expired."""
+        """Raise BadKeys for the first of the identities `names` that cannot be used.
+
+        This is so if its key or its certificate is missing, if the key can be read by other users, or if the certificate is expired.
+        """
         known = {one.name: one for one in self.issued()}
         for name in names:
             Identity(self.path, name).require()

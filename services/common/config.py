@@ -46,7 +46,7 @@ class ServiceConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     endpoint: str = DEFAULT_ENDPOINT
     """Address of the router."""
     namespace: Annotated[str, Meta(pattern="^[a-z0-9_]+$")] = NAMESPACE
-    """Prefix of all keys: icub for the robot, or that of the filter in front of the robot."""
+    """Prefix of all keys on the bus: icub for the robot, or the prefix under which the port filter's clients find the robot."""
     robot: str = "icub"
     """Shipped robot, or path to a robot file."""
     seed: int = 0

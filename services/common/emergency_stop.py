@@ -24,11 +24,14 @@ FOLDER = "mobee/emergency-stop"  # in the user's folder of states
 
 
 class Stop(Struct, frozen=True):
-    """An emergency stop that has not been released. `source`: name of the process that stopped the robot."""
+    """An emergency stop that has not been released.
+
+    `source`: name of the process that stopped the robot. `reason`: text for the user. `time`: time of the stop, s since 1970; 0: not known.
+    """
 
     source: str
     reason: str
-    time: float = 0.0  # s since 1970; 0: unknown
+    time: float = 0.0
 
     def __str__(self) -> str:
         since = time.strftime(" since %Y-%m-%d %H:%M:%S", time.localtime(self.time)) if self.time else ""
@@ -36,7 +39,7 @@ class Stop(Struct, frozen=True):
 
 
 def replaces(new: Stop, old: Stop | None) -> bool:
-    """Return whether a new stop takes the place of the old one in the record: if there is none, or if only the old one is by the launcher.
+    """Return whether a new stop replaces the old one in the record: if `old` is None, or if `old` is by the launcher and `new` is not.
 
     A stop by the launcher ends with its launch; a stop by another process stays.
     """
@@ -104,9 +107,9 @@ class StopRecord:
         return self.read() if self._path.exists() else None
 
     def stop(self, source: str, reason: str) -> bool:
-        """Record a stop, unless one is in force that it does not replace (`replaces`).
+        """Record a new stop. It replaces a stop in force only if that one is by the launcher and the new one is not.
 
-        Returns False if there is no file, so that no robot watches it. Raises OSError.
+        Returns False if there is no file; then no robot watches the record. Raises OSError if the file cannot be written.
         """
         if not self._path.exists():
             return False

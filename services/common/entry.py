@@ -37,7 +37,7 @@ def wait_until_released() -> tuple[str, ...]:
 
 
 def robot_of(config: ServiceConfig) -> Robot:
-    """Load the robot of a service; raises MobeeError if it cannot be read, or the service cannot serve it."""
+    """Load the robot that the settings of a service name; raises MobeeError if it cannot be read, or the service cannot serve it."""
     robot = load_robot(config.robot)
     config.check_robot(robot)
     return robot
@@ -74,7 +74,7 @@ class _OneLine(logging.Formatter):
 
 
 def set_up_log(who: str, file: Path | None = None) -> logging.Logger:
-    """Return the logger of a service; it writes to `file`, or to standard error, which the launcher redirects to a file."""
+    """Return the logger of the service `who`; it writes to `file`, or to standard error, which the launcher redirects to a file."""
     handler = logging.StreamHandler(sys.stderr) if file is None else _LogFile(file)
     handler.setFormatter(_OneLine(f"%(asctime)s.%(msecs)03d %(levelname)-7s {who} %(message)s", datefmt="%H:%M:%S"))
     logging.basicConfig(handlers=[handler], level=logging.INFO, force=True)

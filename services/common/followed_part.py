@@ -21,9 +21,9 @@ RETRY_PERIOD = 0.5  # s of real time between two attempts to take the part
 
 
 class FollowedPart:
-    """Takes, moves and releases the goal of one part for a behaviour, and keeps the newest motion of all parts.
+    """Takes, moves and releases the goal of one part for a behaviour, and keeps the newest `Motion` message of every part.
 
-    No method waits for an answer.
+    The goal of a part is the right to set its attractor, the posture to which the controller moves the part. No method waits for an answer.
     """
 
     def __init__(self, service: Service, robot: Robot, part: str) -> None:

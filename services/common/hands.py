@@ -16,7 +16,7 @@ EQUAL_DISTANCE = 1e-3  # m; palms whose distances differ by less count as equall
 
 
 def moved_markers(robot: Robot, part: str) -> tuple[str, ...]:
-    """Return the names of the markers that a part moves, in the order of the robot's file.
+    """Return the names of the markers (named points on links, such as a palm) that a part moves, in the order of the robot's file.
 
     Raises UnknownName for a part that the robot does not have.
     """
@@ -26,8 +26,9 @@ def moved_markers(robot: Robot, part: str) -> tuple[str, ...]:
 
 
 def hand_of(robot: Robot, part: str) -> str:
-    """Return the name of the marker with which a part reaches: the palm on its side (the right one for a torso), else its first end marker.
+    """Return the name of the marker with which a part reaches: the palm on its side (the right one for a torso), if it moves that palm.
 
+    Otherwise it is the part's first marker at the end of the robot's tree of links (`end_markers`), or else the first marker that it moves.
     Raises UnknownName for a part that the robot does not have, InvalidValue for one that moves no marker.
     """
     found = moved_markers(robot, part)
@@ -40,7 +41,7 @@ def hand_of(robot: Robot, part: str) -> str:
 
 
 def end_markers(robot: Robot) -> tuple[str, ...]:
-    """Return the names of the markers on links at the ends of the tree, or of all markers that motors move if no end has a marker.
+    """Return the names of the markers on links without child links, or of all markers that motors move if no such link has a marker.
 
     Only markers that a motor moves count. Markers that more motors move come first, so that a hand comes before a wheel.
     """
@@ -66,9 +67,9 @@ def part_of(robot: Robot, marker: str) -> str:
 def hand_for(robot: Robot, place: Array | None) -> str:
     """Return the name of the marker with which to reach for a place: the candidate that is nearest to the place when the robot is at home.
 
-    The candidates are the two palms, or, without palms, the end markers that the most motors move. `place`: (3,) m, root frame; None: not
-    known. If several are equally near, or the place is not known, the right palm or the first end marker is returned. Raises InvalidValue
-    if no motor of the robot moves a marker.
+    The candidates are the two palms, or, without palms, the markers at the ends of the robot's tree that the most motors move
+    (`end_markers`). `place`: (3,) m, root frame; None: not known. If several are equally near, or the place is not known, the right palm or
+    the first candidate is returned. Raises InvalidValue if no motor of the robot moves a marker.
     """
     ends = end_markers(robot)
     if not ends:

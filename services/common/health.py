@@ -41,16 +41,20 @@ class Beats:
         return None if self._last is None else now - self._last
 
     def end_window(self, now: float) -> None:
-        """End the present window at the time `now` [s]: set `rate` and `gap` to those of this window, and begin a new one."""
+        """End the present window at the time `now` [s]: set its `rate` [Hz] and longest `gap` [s], and begin a new one."""
         if self._last is not None:
             self.rate, self.gap = self._count / (now - self._begun), max(self._gap, now - self._last)
         self._begun, self._count, self._gap = now, 0, 0.0
 
 
 class Health:
-    """Measures the health of this process, and reports numbers that are beyond their limits; call `check` every WINDOW (5 s).
+    """Measures the health of this process, and warns of values that are beyond their limits; call `check` every WINDOW (5 s).
 
-    `files_limit`: largest number of open files; None: that of the system, if it is known.
+    The values are the rate of the clock's ticks and the longest gap between them, refused messages per second, waiting messages and calls,
+    memory, and open files. Warnings go to the function `report` that is given to `check`.
+
+    `files_limit`: largest number of files that the process may open; a warning is given above 80 % of it. None: the limit of the system; if
+    that is unknown, open files are not judged.
     """
 
     def __init__(self, files_limit: int | None = None) -> None:
@@ -65,8 +69,9 @@ class Health:
     def numbers(self, waiting: int) -> dict[str, int | float | None]:
         """Return the present numbers, by name; None: not measured.
 
-        They are rate [Hz], age and longest gap [ms] of the ticks, refusals per second, memory [MB], open files, threads and waiting
-        messages. `waiting`: number of messages and calls in the inbox.
+        "rate", "age_ms", "gap_ms": rate [Hz], time since the last, and longest gap of the ticks. "refused_rate": refused messages per
+        second. "memory_mb", "files", "threads": memory, open files and threads of the process. "waiting": number of messages and calls in
+        the inbox, as given by `waiting`.
         """
         age, gap = self.beats.age(time.monotonic()), self.beats.gap
         return {
@@ -81,11 +86,11 @@ class Health:
         }
 
     def check(self, expected: float | None, refused: int, waiting: int, report: Callable[[str, str], None]) -> None:
-        """Compare the numbers of the last window with their limits.
+        """Compare the values since the last call with their limits, and report those that became bad or good.
 
         `expected`: rate of the ticks, Hz; None in lockstep or without a clock. `refused`: number of refused messages since the start.
-        `waiting`: number of messages and calls in the inbox. `report(level, text)`: called when a number becomes bad ("warning"), and when
-        it is good again ("info").
+        `waiting`: number of messages and calls in the inbox. `report(level, text)`: called when a value goes beyond its limit ("warning"),
+        and when it has been within the limit for some time ("info").
         """
         now = time.monotonic()
         self.beats.end_window(now)

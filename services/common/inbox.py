@@ -78,7 +78,7 @@ class Inbox:
         self._wake()
 
     def handle(self, handler: Handler) -> None:
-        """Run the handler in this thread if the main thread waits in `serve` and no handler is queued; otherwise queue it as `put` does.
+        """Run the handler in this thread if the main thread waits in `serve` and no handler is queued; otherwise queue the handler.
 
         An exception of the handler is raised in the main thread.
         """
@@ -100,11 +100,10 @@ class Inbox:
         return len(self._queue) + len(self._later)
 
     def offer(self, handler: Handler, crowd: int = CROWDED) -> bool:
-        """Queue the handler as `put` does and return True.
+        """Queue the handler for the main thread and return True; any thread may call this.
 
-        If `crowd` handlers already wait, drop the handler, count it in `dropped` and return False.
-
-        This limits the memory that a flood of messages takes.
+        If `crowd` handlers already wait, drop the handler, count it in `dropped` and return False. This limits the memory that a flood of
+        messages takes.
         """
         if len(self._queue) >= crowd:
             self.dropped += 1
@@ -113,7 +112,10 @@ class Inbox:
         return True
 
     def offer_later(self, handler: Handler, crowd: int = CROWDED) -> bool:
-        """Queue a handler as `offer` does, but without waking the main thread; it runs just before the next handler of `put`."""
+        """Queue a handler without waking the main thread; it runs just before the next handler that `put` queues.
+
+        Return True. If `crowd` handlers already wait, drop the handler, count it in `dropped` and return False.
+        """
         if len(self._later) >= crowd:
             self.dropped += 1
             return False
@@ -139,7 +141,7 @@ class Inbox:
         self._spin(until, enough, self._take_waiting)
 
     def serve(self, until: float) -> None:
-        """Run handlers as `spin` does; while this thread waits, other threads may run their handlers themselves (`handle`).
+        """Run handlers until the time `until` [s] of the monotonic clock; meanwhile other threads may run handlers too (`handle`).
 
         The thread that has received a message then also handles it, which saves two thread switches.
         """

@@ -109,7 +109,10 @@ class Listener:
         self._kept.append(self.bus.session.declare_subscriber(key, Callback(stay_known(offer), indirect=False) if self._direct else offer))
 
     def on_clock(self, handler: Callable[[Clock], None]) -> None:
-        """Call `handler` with the newest `Clock` message; at the first one of a run, the handlers of `on_run` are called before."""
+        """Call `handler` with the newest `Clock` message.
+
+        At the first message of a run of robot_sim, the handlers of `on_run` are called before it.
+        """
         self._on_time(Clock, handler)
 
     def on_tick(self, handler: Callable[[Tick], None]) -> None:

@@ -19,7 +19,7 @@ TEST_DELAY = "MOBEE_TEST_DELAY_MS"  # environment variable: longest random sleep
 
 
 class Participant:
-    """The side of a service in lockstep: reports that the service has answered a tick. In free mode it does nothing."""
+    """A service's part in lockstep: sends robot_sim the message that the service has answered a tick. In free mode it does nothing."""
 
     def __init__(self, service: Service) -> None:
         self._locked = service.keeps_step = service.locked
@@ -31,11 +31,11 @@ class Participant:
     def done(
         self, k: int, *, ok: bool = True, busy: Sequence[str] = (), last: bool = False, including: Sequence[str] = (), implied: bool = False
     ) -> None:
-        """Report that this service has published all its messages for tick k. In free mode this does nothing.
+        """Publish that this service has sent all its messages for tick k (`StepDone`). In free mode this does nothing.
 
-        `ok`: False if an input was missing, so that the run is not repeatable. `busy`: from the controller, services that have nothing to
-        decide. `last`: True if the service leaves lockstep. `including`: participants whose answers to this tick were used, so that they
-        need not answer. `implied`: publish nothing, because the answer of another service will include this one.
+        `ok`: False if an input was missing, so that the run is not repeatable. `busy`: set by the controller only, names of services that
+        have nothing to decide. `last`: True if the service leaves lockstep. `including`: participants whose answers to this tick were used,
+        so that they need not answer. `implied`: publish nothing, because the answer of another service will include this one.
         """
         if not self._locked:
             return
@@ -44,7 +44,7 @@ class Participant:
             self._done.put(re_k=k, ok=ok, busy=list(busy), last=last, including=list(including))
 
     def inject_test_delay(self) -> None:
-        """Sleep for a random time if the variable MOBEE_TEST_DELAY_MS is set, to test that delays change no result."""
+        """Sleep for a random time of at most MOBEE_TEST_DELAY_MS (environment variable) ms, to test that delays change no result."""
         if self._delay:
             time.sleep(random.uniform(0.0, self._delay))  # not seeded, like a scheduler
 
@@ -98,7 +98,10 @@ class Barrier:
         return sorted(waiting)
 
     def wait(self, k: int) -> list[str]:
-        """Handle messages until all have answered tick k, or for `patience` s; drop the late participants and return their names."""
+        """Handle messages until all present participants have answered tick k, for at most `patience` s of real time.
+
+        Those that have not answered then are dropped, and their names are returned.
+        """
         if self._referee not in self._present:
             self._give_turns(())
         self._service.spin(time.monotonic() + self._patience, lambda: not self.missing(k))

@@ -20,12 +20,12 @@ from services.common.bus import other_key
 
 @dataclass(frozen=True, slots=True)
 class Received:
-    """A message of any type, not decoded. `at`: time at which it was received."""
+    """A message of any type, not decoded. `at`: time at which it was received, s of the monotonic clock."""
 
     key: str
     encoding: str
     payload: bytes
-    at: float  # s, monotonic
+    at: float
 
     @property
     def type(self) -> str:

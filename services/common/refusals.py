@@ -113,7 +113,7 @@ class RefusalLog:
         return found
 
     def read(self) -> bool:
-        """Read what Zenoh has logged since the last call. Return True if this was much, so that the next call should come soon."""
+        """Read what Zenoh has logged since the last call. Return True if it was so much that the next call should come soon."""
         for chunks in range(_MOST_CHUNKS):
             try:
                 chunk = os.read(self._reader, _CHUNK)

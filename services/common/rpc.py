@@ -29,7 +29,8 @@ LOCKED_TIMEOUT = 1.5  # s, in lockstep: shorter than its patience, so that the l
 class CallFailed(Exception):
     """Raised for a call without a valid reply.
 
-    `code`: that of the server's refusal, "no_answer" if no reply came in time, or "bad_answer" if the reply does not match its struct.
+    `code`: the code with which the server has refused the call, "no_answer" if no reply came in time, or "bad_answer" if the reply does not
+    match its struct.
     """
 
     def __init__(self, code: str, text: str) -> None:

@@ -52,8 +52,8 @@ FRESH_STATS, STATS_PERIOD = 10, 0.2  # of so many answers to `stat` within so ma
 class Service(Listener):
     """A process on the bus. All handlers run one after the other, in the main thread, inside `spin` or `run`.
 
-    Exception: in lockstep, while a service that was made with `prompt` is in `run`, its handlers run in Zenoh's thread. That thread must
-    not wait, so these handlers must not use `call`.
+    Exception: if a service was made with `prompt` = True, its handlers run in Zenoh's thread in lockstep while it is in `run`. That thread
+    must not wait, so these handlers must not use `call`.
     """
 
     def __init__(
@@ -381,7 +381,10 @@ def _measured(value: float) -> int | float | None:
 
 
 def return_free_memory() -> None:
-    """Return unused memory of this process to the system, if the C library can do so. After the start this is 23 MB if meshes were read."""
+    """Return unused memory of this process to the system, if the C library can do so.
+
+    At the end of the start this is about 23 MB if meshes were read.
+    """
     trim = _malloc_trim()
     if trim is not None:
         trim(0)
@@ -420,7 +423,8 @@ def run_node(
         config_class: type of the settings.
         node: creates the object whose handlers the service runs.
         argv: command line without the program's name; None: that of this process.
-        prompt: every tick waits for this service, and its handlers never compute for long, as in `Service`.
+        prompt: True for a service for which every tick waits, and whose handlers never compute for long; in lockstep these then run in the
+            thread that receives the messages, which saves time.
     """
     config = load_config(config_class, argv, module)
     with explained(module):

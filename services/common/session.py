@@ -69,10 +69,10 @@ def _config(namespace: str, lease: float, settings: dict[str, object]) -> zenoh.
 def end_unreceived(endpoint: str, lease: float) -> None:
     """Let the system end connections of this process at `endpoint` if the other side receives no data for `lease` [s].
 
-    Only Linux can do so; for an endpoint of this host nothing is changed. Zenoh ends a silent connection after the lease, but with TLS not
-    before the data in its socket is sent: after a cut of the network this takes as long again as the cut. A listener gives the limit to the
-    connections that it accepts. A client must set it again after each new connection. On one host nothing is cut, and a process may get no
-    processor for longer than the lease.
+    Only Linux can do so; for an endpoint of this host nothing is changed, because such a connection cannot be interrupted, and a process
+    may get no processor for longer than the lease. Zenoh itself ends a silent connection after the lease, but with TLS only when the data
+    in its socket is sent, which may be long after an interrupted network works again. A listener gives the limit to the connections that it
+    accepts. A client must set it again after each new connection.
     """
     if not is_local(endpoint) and hasattr(socket, "TCP_USER_TIMEOUT"):
         _set_option(sockets_at(endpoint), socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, round(1e3 * lease))
@@ -81,8 +81,8 @@ def end_unreceived(endpoint: str, lease: float) -> None:
 def receive_together(sockets: Iterable[int], count: int) -> None:
     """Let the system wake this process for data of the connections `sockets` only when `count` bytes wait; only Linux can do so.
 
-    `sockets`: as `sockets_at` returns them. With `count` = 1, all waiting data is received at once. The caller must set 1 several times in
-    a lease, because a connection counts as dead if nothing is received for a whole lease.
+    `sockets`: their file descriptors, as `sockets_at` returns them. With `count` = 1, all waiting data is received at once. The caller must
+    set 1 several times in a lease, because a connection counts as dead if nothing is received for a whole lease.
     """
     if sys.platform == "linux":
         _set_option(sockets, socket.SOL_SOCKET, socket.SO_RCVLOWAT, count)
@@ -196,9 +196,10 @@ def open_router(
     """Open a session that is the router and listens at `endpoint`; raises BusUnreachable if it cannot listen there.
 
     `lease`: time [s] without a message after which a connection counts as dead. `local_endpoint`: a second address, for processes on this
-    machine; empty: none. `identity`: that of a secured router, which listens at the socket of the identity instead of `local_endpoint`.
-    `access`: its access list, as `services.common.access.access_list` returns it. A connection that sends nothing is closed after 5 s, and
-    10 000 connections may wait, so that silent ones do not keep other processes out.
+    machine; empty: none. `identity`: identity of a secured router, which listens at the Unix socket of its folder of keys instead of
+    `local_endpoint`; None: the router is not secured. `access`: access list of a secured router, as `services.common.access.access_list`
+    returns it. A connection that sends nothing is closed after 5 s, and 10 000 connections may wait, so that silent connections do not keep
+    other processes out.
     """
     settings: dict[str, object] = {
         "mode": "router",

@@ -27,7 +27,7 @@ class Raw(Struct, frozen=True, gc=False):
     encoding: str
     payload: bytes
     received: int
-    published: int  # by the sender's clock
+    published: int
 
     @property
     def type(self) -> str:

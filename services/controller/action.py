@@ -16,7 +16,7 @@ MOST_SUSPENSIONS = 5  # of one action: a part that is held again and again would
 
 @dataclass
 class Owner:
-    """The process that owns a part's goal, as long as its liveliness token exists.
+    """The process that owns a part's goal (the right to set its attractor), as long as its liveliness token exists.
 
     `who`: name of its service. `instance`: last chunk of its token. `epoch`: number of the ownership.
     """
@@ -27,7 +27,11 @@ class Owner:
 
 
 class Action:
-    """The owner of a part's goal, and the part's newest action with its status. Times are in s of the bus clock, ticks are numbers k."""
+    """The owner of a part's goal (the right to set its attractor), and the part's newest action with its status.
+
+    `id`: id of the action; empty: none. `status`: idle, moving, settled, timeout, suspended or held. `since_k`, `start_k`: ticks at which
+    the status and the action began. Times are in s of the bus clock.
+    """
 
     def __init__(self, settle: Settle) -> None:
         self._settle = settle
@@ -49,7 +53,7 @@ class Action:
 
     @property
     def is_in_hold(self) -> bool:
-        """Whether the part is not under control: its status is "held" or "suspended"."""
+        """Whether robot_sim does not follow the controller's commands to the part: its status is "held" or "suspended"."""
         return self.status in ("held", "suspended")
 
     @property
@@ -77,12 +81,12 @@ class Action:
         self._set_status("suspended", k)
 
     def settle_again(self, k: int, t: float) -> None:
-        """Begin a new settle test at tick k, at the time t [s]: the action is "moving", and ends when the part settles or times out."""
+        """Set the status "moving" again at tick k, at the time t [s]; the action then ends when the part settles or times out."""
         self._test = SettleTest(self._settle, t)
         self._set_status("moving", k)
 
     def update(self, k: int, t: float, speeds: Array, accelerations: Array, continues: Callable[[], bool] = lambda: False) -> None:
-        """Run the settle test and set the status.
+        """Test whether the motion of the part has settled or timed out, and set the status accordingly.
 
         Args:
             k: tick.
@@ -103,7 +107,7 @@ class Action:
         self._set_status("held", k)
 
     def resume(self, k: int) -> None:
-        """Set the status of a part that is under control again to "idle": at rest, without an action."""
+        """Set the status "idle" (at rest, without an action) at tick k, because the part is under control again."""
         self.id = ""
         self._set_status("idle", k)
 

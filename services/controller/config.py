@@ -25,13 +25,13 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     ttl: Annotated[int, Meta(ge=20, le=200)] = 100
     """Milliseconds without a command after which robot_sim holds a part."""
     terms: list[str] = []
-    """User-defined forces of the law. Each is `module:name` of an importable Term, or of the function of a term. The model needs the same
-    setting."""
+    """User-defined forces of the control law. Each is `module:name`, where the name in the importable module is a
+    `mobee.control.terms.Term` or a function that returns the force. The model needs the same setting."""
     posture: dict[str, list[float]] = {}
     """Posture of each part while it has no owner, rad, by name of the part; a part that is not named stays where it is."""
 
     def check_robot(self, robot: Robot) -> None:
-        """Check the robot as every service does, that it can take the posture, and that the terms can be loaded; raises MobeeError."""
+        """Raise MobeeError if the robot cannot take the posture, a term cannot be loaded, or a part's name cannot be used on the bus."""
         super().check_robot(robot)
         if self.terms:
             load_terms(self.terms)

@@ -20,10 +20,11 @@ CONFIRM_TIME = 0.1  # s within which the state of a part must show that it was a
 
 
 class Drives:
-    """Takes and arms the drives of all parts: holds the drive epoch of each part, and whether robot_sim follows this controller's commands.
+    """Takes and arms the drives of all parts; a drive is the right to command the motors of one part.
 
-    No method waits for an answer, because the other parts need their commands while one is being armed. Times are of the monotonic clock,
-    in lockstep of the bus clock.
+    It also knows whether robot_sim follows this controller's commands. `epochs`: for each part, the number of this controller's ownership
+    of the drive, which each command must contain. No method waits for an answer, because the other parts need their commands while one is
+    being armed. Times are of the monotonic clock, in lockstep of the bus clock.
     """
 
     def __init__(self, service: Service, robot: Robot) -> None:

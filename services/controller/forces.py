@@ -25,7 +25,10 @@ MAX_STATE_AGE = 100_000_000  # ns; a part whose state is older is not under cont
 
 
 class ModelForces:
-    """The newest valid forces of the model: the message, and the forces as vectors."""
+    """The newest valid forces of the model.
+
+    `message`: the newest valid `Forces` message; None: there is none in this run. `vectors`: the forces in this message, (n,) rad/s^2 each.
+    """
 
     def __init__(self, robot: Robot, needs_contacts: bool) -> None:
         """`needs_contacts`: True if messages without contacts must be refused, because terms of the law may depend on contacts."""
@@ -86,7 +89,7 @@ def _unknown_link(contacts: Iterable[ContactItem], links: int) -> str:
 
 
 def load_terms(names: Sequence[str]) -> tuple[Term, ...]:
-    """Import user-defined terms, each given as `module:name`; a function becomes a term with its own name.
+    """Import user-defined terms (forces of the control law), each given as `module:name`; a function becomes a term of the same name.
 
     Raises InvalidValue for a name that cannot be imported or is no term.
     """
@@ -99,16 +102,16 @@ def _term(path: str) -> Term:
 
 
 class PublishedContacts:
-    """The contacts that the model published, as a finder of contacts for `mobee.model.pose.Pose.compute_contacts`."""
+    """The contacts that the model published, in place of a search for contacts in `mobee.model.pose.Pose.compute_contacts`."""
 
     def __init__(self, pose: Pose, contacts: Sequence[ContactItem]) -> None:
         self._pose, self._contacts = pose, contacts
 
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands) -> tuple[ContactTable, Array]:
-        """Return the contact table of one pose q (1, n) rad, and the projection of its field contacts to the motors, (1, n) m^2/rad.
+        """Return the published contacts for one pose q (1, n) rad, and the projection of field contacts to the motors, (1, n) m^2/rad.
 
-        The projection is the sum of J^T (depth * normal), as in `Pose.projection`. `snapshot` and `reaching` are not used: the model has
-        already applied them.
+        Fields are larger volumes around links, whose contacts cause repulsive forces. The projection is the sum of J^T (depth * normal)
+        over these contacts. `snapshot` and `reaching` are not used: the model has already applied them.
         """
         projection, numbers, reals = np.zeros_like(q), list[tuple[int, ...]](), list[list[float]]()
         for at, contact in enumerate(self._contacts):

@@ -36,7 +36,11 @@ def _by_part(handler: Callable[[str, _Q], Reply]) -> Callable[[_Q, str], Reply]:
 
 
 class GoalServer:
-    """Answers calls about the goals of all parts. An epoch belongs to one owner, and ends when the owner's liveliness token disappears."""
+    """Answers calls about the goals of all parts: take, release, goal, force and reach.
+
+    The goal of a part is the right to set its attractor. Each new owner of a goal gets a new epoch, a number that its later calls must
+    contain. The ownership ends when the owner's liveliness token disappears.
+    """
 
     def __init__(
         self, service: Service, robot: Robot, law: RobotLaw, actions: dict[str, Action], reaches: Reaches, commands: CommandPublisher

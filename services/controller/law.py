@@ -61,7 +61,7 @@ class RobotLaw:
         self._law.reset(self._robot.home)
 
     def measure(self, q: Array) -> None:
-        """Store the measured positions q (n,) rad at the start of a tick."""
+        """Store the measured positions q (n,) rad of all motors; call this at the start of a tick."""
         self.q, self._last_tick = q, None
 
     def count_ticks(self, k: int) -> int:
@@ -147,9 +147,9 @@ class RobotLaw:
         return self._law.velocity[where], self._law.acceleration[where], self._law.attractor[where]
 
     def settle_speeds(self, part: str) -> tuple[Array, Array]:
-        """Return commanded velocity and acceleration of the part's motors, (n_part,) each, for the settle test: in rad/s and rad/s^2.
+        """Return commanded velocity and acceleration of the part's motors, (n_part,) each, by which the end of a motion is detected.
 
-        For a motor that slides, 1 rad is its fine unit, a share of its range (`mobee.robot.motor_units`).
+        Units: rad/s and rad/s^2. For a motor that slides, 1 rad is its fine unit, a share of its range (`mobee.robot.motor_units`).
         """
         where = self._where[part]
         return self._law.velocity[where] / self._units[where], self._law.acceleration[where] / self._units[where]
@@ -203,7 +203,7 @@ class RobotLaw:
 
 
 def warm_up(law: Controller, robot: Robot) -> None:
-    """Begin, step and end a reach of each part with each marker that it moves, and decode a request, so that later ones are quick.
+    """Begin, step and end a reach of each part with each marker that it moves, and decode a request, so that later reaches start quickly.
 
     Afterwards the law is at rest at home.
     """

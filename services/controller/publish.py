@@ -22,7 +22,7 @@ PUBLISH_PERIOD = 0.01  # s of real time between two motions of a part in free mo
 
 
 class Counters:
-    """The counts of one measurement, and the jitter of the steps."""
+    """The counts of the controller since a measurement began, and the jitter of the control steps."""
 
     def __init__(self) -> None:
         self.ticks = self.late_forces = self.held_ticks = self.long_gaps = 0
@@ -36,7 +36,12 @@ class Counters:
             self._jitter.add(abs(self._stepped_at - before - period) * 1e3)
 
     def numbers(self) -> Mapping[str, float]:
-        """Return the counts of the measurement, and percentiles of the jitter [ms], by name, for the call `stat`."""
+        """Return the counts of the measurement by name, for the call `stat`.
+
+        "ticks": number of control steps. "late_forces": number of steps that were made before the model's forces of the tick had arrived.
+        "held_ticks": number of ticks in which a part was not under control, added over the parts. "long_gaps": number of steps that came
+        more than 3 ticks (MAX_TICKS) after the one before. "jitter_ms_p50", "jitter_ms_p99": percentiles of the jitter [ms].
+        """
         return {
             "ticks": self.ticks,
             "late_forces": self.late_forces,
@@ -115,7 +120,10 @@ class CommandPublisher:
             self._commands.put(re_k=k, parts=orders, ref=reference.tolist(), ttl=self._ttl, answer=answer)
 
     def send_again(self, part: str) -> None:
-        """In free mode, make a request for a part act before the next tick: compute the last step again and publish its commands."""
+        """In free mode, let a client's request for a part take effect before the next tick.
+
+        The last control step is computed again with the request, and its commands are published. In lockstep nothing is done.
+        """
         if self._service.locked or self._sent is None or part not in self._sent[1]:
             return
         reference = self._law.repeat_step()
@@ -126,7 +134,8 @@ class CommandPublisher:
         """In lockstep, publish the commands of a tick, and answer the tick in the same message.
 
         The answer is sent later if a part is being armed. Tick 0, which is repeated, is answered only when all parts are ready and the
-        forces are fresh. `fresh`: whether the forces of the model may be used. `orders`, `reference`: as in `send`.
+        forces are fresh. `fresh`: whether the forces of the model may be used. `orders`: drive epoch and kind of command, by part.
+        `reference`: (n,) rad, rad/s or N m, by the modality in the settings.
         """
         if tick.k == 0 and not (fresh and self._is_ready(tick)):
             return

@@ -26,9 +26,11 @@ ENDED_PERIODS = 10  # of these between two messages of a reach that has ended
 
 @dataclass
 class Reach:
-    """The last reach of a part.
+    """The last reach of a part: a force pulls a marker to a target.
 
-    The field `q` and those after it are of the tick `end_k`, in which the force ended or, until then, of the newest tick.
+    `object`: name of the target in the model's world. `stay`: whether the part stays where the force ends. `end_k`: tick in which the force
+    ended; until then the newest tick. `q`, `position`: measured positions (n,) rad and position of the marker (3,) m, root frame, in that
+    tick. `settled`: whether the force ended because the part had settled. `touched`: world objects in contact with the part at that time.
     """
 
     action_id: str
@@ -36,8 +38,8 @@ class Reach:
     object: str
     target: ReachTarget
     stay: bool
-    q: Array  # (n,) rad, measured
-    position: Array  # (3,) m, of the marker
+    q: Array
+    position: Array
     end_k: int
     phase: ReachPhase = "reaching"
     settled: bool = False
@@ -91,7 +93,8 @@ class Reaches:
     def update(self, part: str, tick: Tick) -> None:
         """End the force of a part's reach when the part has settled or timed out; the attractor then pulls the part back.
 
-        The reach is over when the part has settled again. With `stay` it is over at once, and the part stays where the force ended.
+        The reach is over when the part has settled again. If the reach was requested with `stay`, it is over at once, and the part stays
+        where the force ended.
         """
         reach, action = self._last.get(part), self._actions[part]
         if reach is None or action.status == "moving" or reach.phase not in ("reaching", "returning"):

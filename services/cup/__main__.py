@@ -13,7 +13,7 @@ from services.cup.node import CupNode
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Run the service until the cup was put down as often as configured, or until a signal or a shutdown call."""
+    """Fetch the cup and put it down elsewhere, until this was done as often as configured, or until a signal or a shutdown call."""
     config = load_config(Config, argv, "services.cup")
     with explained("services.cup"):
         robot = robot_of(config)

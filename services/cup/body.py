@@ -33,7 +33,7 @@ class Bumped(Exception):
 class BusBody(BusFollower):
     """The running robot as a `mobee.behaviours.pick.Body`: moves the parts `parts` along paths, by their attractors.
 
-    `gains`: those of the controller. `require_seen`: called before every step; it raises an error to end the motion.
+    `gains`: the gains of the running controller's law. `require_seen`: called before every step; it raises an error to end the motion.
     """
 
     def __init__(self, service: Service, robot: Robot, parts: Sequence[str], gains: Gains, require_seen: Callable[[], None]) -> None:
@@ -50,8 +50,10 @@ class BusBody(BusFollower):
         """Move along a path (K, n) rad, and wait until the parts rest.
 
         Returns whether the arm has bumped into something, and the posture at that time, or at the end. `speed`: share of the motors'
-        largest speed. `watch`: detects bumps; None: they are not detected. `forces`: the law's forces (n,) rad/s^2 at a posture, which the
-        attractors balance; None: none. After a bump the robot moves back along the path by 3 s of the motion (BACK).
+        largest speed, above 0 and at most 1. `watch`: detects bumps; None: they are not detected. `forces`: function that takes a posture
+        (n,) rad and returns the forces (n,) rad/s^2 of the control law except spring and damping. The attractors are shifted such that
+        their springs cancel these forces; None: they are not cancelled. After a bump the robot moves back along the path by 3 s of the
+        motion (BACK).
         """
         robot = self.robot
         rows = list(attractors(robot, timed(robot, np.clip(path, *robot.limits.T), self._gains, speed), self._gains, forces))

@@ -34,7 +34,7 @@ class Config(WorldConfig, frozen=True, kw_only=True):
     the thing."""
 
     def check_robot(self, robot: Robot) -> None:
-        """Check the robot as every service does, that it has the hand, and that the thing stands on something; raises MobeeError."""
+        """Raise MobeeError if the robot lacks the hand, if the thing stands on nothing, or if a part's name cannot be used on the bus."""
         super().check_robot(robot)
         Hand(robot, self.marker)
         self.ground()

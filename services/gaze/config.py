@@ -16,17 +16,18 @@ from services.common.cameras import require_cameras
 
 
 class Config(BehaviourConfig, frozen=True, kw_only=True):
-    """The gaze's settings."""
+    """The settings of the gaze, which turns the cameras so that a target is in the middle of the pictures."""
 
     part: str = "head"
     """Part that turns the cameras."""
     cameras: tuple[str, ...] = ()
-    """Further cameras to aim, beside the robot's own, as in the settings of the renderer."""
+    """Further cameras to aim, beside those of the robot's file; each as in `services.common.cameras.CameraConfig.cameras`, for example
+    NAME, the name of a camera in the file, a link or a marker."""
     lag: Annotated[float, Meta(ge=0, le=0.5)] = LAG
     """Time by which the motors' velocity lags behind the commanded velocity, in s."""
 
     def check_robot(self, robot: Robot) -> None:
-        """Check the robot as every service does, and that the part turns a camera; raises MobeeError."""
+        """Raise MobeeError if the part turns no camera, or if a part's name cannot be used on the bus."""
         super().check_robot(robot)
         self.gaze(robot)
 

@@ -23,17 +23,17 @@ class Entry:
     it. `given`: settings that follow from the name of the service.
     """
 
-    module: str  # run with `python -m mobee_system.run`
-    config: str  # its configuration: module:class
+    module: str
+    config: str
     stage: int  # services are listed in this order, and stopped in the opposite one
-    after: tuple[str, ...] = ()  # services that must be ready before it joins the system
+    after: tuple[str, ...] = ()
     nice: int = 0
-    vital: bool = True  # the robot is stopped if it is given up
-    participates: bool = True  # lockstep: every tick waits for it
+    vital: bool = True
+    participates: bool = True
     may_end: bool = False  # it can finish by itself; any other service that ends without the launcher's request has failed
-    real_time: bool = False  # its results depend on real time, so that it is left out in lockstep
-    needs: Mapping[str, str] = field(default_factory=dict)  # importable package -> extra of this project
-    given: Mapping[str, str] = field(default_factory=dict)  # settings that the name of the service implies
+    real_time: bool = False
+    needs: Mapping[str, str] = field(default_factory=dict)
+    given: Mapping[str, str] = field(default_factory=dict)
 
 
 _NICE_PICTURES = 10  # niceness of services that may be late

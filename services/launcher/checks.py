@@ -38,7 +38,7 @@ class PortInUse(Exception):
 class SystemRuns(Exception):
     """Raised if another system runs at the router's endpoint, or may use one of the ports.
 
-    The message describes it and says how to end it.
+    The message describes the other system and says how to end it.
     """
 
 

@@ -64,51 +64,59 @@ class Watched(Protocol):
 class Program:
     """The command of one service process, and the rules for its supervision.
 
-    `who`: name of the service. `argv`: command. `log`: file of its standard output and error. `stage`, `after`, `nice`, `vital`, `may_end`:
-    as in `services.launcher.catalogue.Entry`. `patience`: least time without an answer [s] after which it may count as frozen.
-    `environment`: variables that are added to the launcher's own.
+    `who`: name of the service. `argv`: command. `log`: file of its standard output and error. `stage`: place in the order of the services;
+    the last stage is stopped first. `after`: services that must be ready before it joins the system. `nice`: niceness of its process.
+    `vital`: whether the robot is stopped if the launcher gives the service up. `may_end`: whether it may end by itself without a failure.
+    `patience`: least time without an answer [s] after which it may count as frozen. `environment`: variables that are added to the
+    launcher's own.
     """
 
     who: str
     argv: tuple[str, ...]
-    log: Path  # standard output and error
+    log: Path
     stage: int = 0
     after: tuple[str, ...] = ()
     nice: int = 0
     vital: bool = True
     may_end: bool = False  # by itself, with code 0
-    patience: float = 0.0  # least time [s] without an answer after which it counts as frozen
-    environment: Mapping[str, str] = field(default_factory=dict)  # added to the launcher's own
+    patience: float = 0.0
+    environment: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass
 class Child:
     """A service of this host: its program and the process that runs it at present.
 
-    Times are monotonic, in s. `phase`: as of `Watched.phase`. `since`: time of the last change of phase. `failures`: times of recent
-    failures. `again_at`: time of the next start. `has_token`: the process has its liveliness token on the bus. `asked_at`, `answered_at`:
-    times of the last `stat` call and the last answer. `asking`: a call is open. `unanswered`: calls in a row without an answer. `stat`:
-    last answer. `handled`, `advanced_at`, `starvation`: measurements while the service is silent.
+    Times are monotonic, in s. `phase`: waiting (for other services), starting, ready, failed (to be restarted), fault (given up) or ended.
+    `since`: time of the last change of phase. `failures`: times of recent failures. `again_at`: time of the next start. `has_token`:
+    whether the process has its liveliness token on the bus. `asked_at`, `answered_at`: times of the last `stat` call and the last answer.
+    `asking`: a call waits for its answer. `unanswered`: number of calls in a row without an answer. `stat`: last answer of the present
+    process. `standby`: process that replaces the present process when this one fails. `has_prepared`: a standby process was started since
+    the last start. `reason`: reason of the last failure.
+
+    While the service is silent, that is, does not answer: `handled`: number of messages that it had handled at the last pulse.
+    `advanced_at`: time at which this number was last seen to grow. `starvation`: time in which the service or the launcher waited for a
+    processor.
     """
 
     program: Program
     phase: Phase = "waiting"
     process: subprocess.Popen[bytes] | None = None
-    standby: subprocess.Popen[bytes] | None = None  # takes the place of the process when that one fails
-    has_prepared: bool = False  # a standby process was started since the last start
-    since: float = 0.0  # monotonic time of the last change of phase
-    failures: deque[float] = field(default_factory=deque)  # monotonic times
+    standby: subprocess.Popen[bytes] | None = None
+    has_prepared: bool = False
+    since: float = 0.0
+    failures: deque[float] = field(default_factory=deque)
     restarts: int = 0
-    again_at: float = 0.0  # monotonic time of the next start
+    again_at: float = 0.0
     has_token: bool = False
     asked_at: float = 0.0
-    answered_at: float = 0.0  # monotonic, as asked_at
+    answered_at: float = 0.0
     asking: bool = False
-    unanswered: int = 0  # stat calls in a row
-    stat: Stat | None = None  # last answer of the present process
-    handled: int | None = None  # by its inbox, at the last pulse of the present silence
-    advanced_at: float = 0.0  # monotonic time at which the inbox was last seen to advance
-    starvation: Starvation | None = None  # of it and the launcher, in the present silence
+    unanswered: int = 0
+    stat: Stat | None = None
+    handled: int | None = None
+    advanced_at: float = 0.0
+    starvation: Starvation | None = None
     reason: str = ""  # of the last failure
     host: str = ""
 
@@ -144,7 +152,11 @@ class Child:
         self.note_answer(0.0)
 
     def prepare(self, launcher: str) -> None:
-        """Start a standby process, which does not join the system before `spawn` uses it; arguments and errors as in `spawn`."""
+        """Start a standby process, which does not join the system before `spawn` uses it.
+
+        `launcher`: value of the environment variable HELD, which names the router that the process may join. Raises OSError if the
+        operating system refuses to start the process.
+        """
         self.has_prepared = True
         self.standby = self._start(launcher)
 

@@ -35,24 +35,24 @@ class Connection:
 
     `who`: name of this launcher on the bus. `endpoint`: address at which its services reach the router. `session`: the launcher's session.
     `router`: session that is the router; None: the router is on another host. `local`: second address of the router, for services of this
-    host in lockstep; empty: none. `security`: keys; None: not secured. `refusals`: log of what the router refuses. `first`: agreement with
-    the first launcher, if this launcher has joined another host; None: this launcher is the first.
+    host in lockstep; empty: none. `security`: keys of the launch; None: the connections are not secured. `refusals`: log of what a secured
+    router refuses. `first`: agreement with the first launcher, if this launcher has joined another host; None: this launcher is the first.
     """
 
-    who: str  # name of this launcher on the bus
-    endpoint: str  # at which its services reach the router
+    who: str
+    endpoint: str
     session: Session
-    router: Session | None = None  # None: it is on another host
-    local: str = ""  # another address of the router, for services of this host in lockstep
+    router: Session | None = None
+    local: str = ""
     security: Security | None = None
     refusals: RefusalLog | None = None
-    first: Agreement | None = None  # with the launcher of another host, which this one joins; None: this is the first
+    first: Agreement | None = None
 
 
 def open_bus(
     scenario: Scenario, here: Scenario, endpoint: str, keys: Path | None, insecure: bool, elsewhere: Sequence[str], stack: ExitStack
 ) -> Connection:
-    """Open the router of a system, and a session with it; return both.
+    """Open the router of a system, and a session with the router; return both in a `Connection`.
 
     Args:
         scenario: all services.
@@ -61,11 +61,11 @@ def open_bus(
         keys: folder of keys; None: the system is not secured.
         insecure: whether other hosts may reach the endpoint without keys.
         elsewhere: names of the services that other hosts start.
-        stack: closes the router when it ends.
+        stack: closes the router, and the router's local address, when the stack itself is closed.
 
     Raises:
         ConfigError: other hosts can reach the endpoint, and neither `keys` nor `insecure` is given.
-        SystemRuns: a system already runs there.
+        SystemRuns: a system already runs at the endpoint.
         PortInUse: a port of a service is in use.
         BusUnreachable: the router cannot be opened or reached.
         BadKeys: a key cannot be used.

@@ -38,14 +38,14 @@ class JoinRefused(Exception):
 class Agreement(Struct, frozen=True, kw_only=True):
     """What the launchers of two hosts must agree on. The first launcher returns it as the answer to the call `config`.
 
-    `version`: version of MoBeE. `instance`: instance of the first launcher, whose host runs the router. `elsewhere`: services that other
-    hosts start. `services`: settings of all services, by name, without settings that may differ between hosts, such as ports.
+    `version`: version of MoBeE. `instance`: id of the first launcher's process, whose host runs the router. `elsewhere`: services that
+    other hosts start. `services`: settings of all services, by name, without settings that may differ between hosts, such as ports.
     """
 
-    version: str  # of MoBeE
-    instance: str  # of the first launcher, which is the router
-    elsewhere: tuple[str, ...]  # services that other hosts start
-    services: dict[str, dict[str, Any]]  # settings of all services, without those of a host
+    version: str
+    instance: str
+    elsewhere: tuple[str, ...]
+    services: dict[str, dict[str, Any]]
 
 
 def name_of(host: str) -> str:
@@ -72,7 +72,7 @@ def check_names(option: str, names: Iterable[str], scenario: Scenario) -> None:
 def check_elsewhere(elsewhere: Collection[str], scenario: Scenario) -> None:
     """Raise ConfigError if other hosts cannot start the services `elsewhere`.
 
-    A name may be unknown, no service may remain for this host, or lockstep may need the service on this host.
+    This is so if a name is unknown, if no service remains for this host, or if in lockstep every tick waits for one of the services.
     """
     check_names("--elsewhere", elsewhere, scenario)
     if all(part.who in elsewhere for part in scenario.parts):
@@ -85,7 +85,7 @@ def check_elsewhere(elsewhere: Collection[str], scenario: Scenario) -> None:
 def agreement(scenario: Scenario, instance: str = "", elsewhere: Sequence[str] = ()) -> Agreement:
     """Return the version and the settings of this host's scenario, which the launchers of two hosts compare.
 
-    `instance`: of this launcher. `elsewhere`: services that other hosts start.
+    `instance`: id of this launcher's process. `elsewhere`: services that other hosts start.
     """
     services = {part.who: _settings(part) for part in scenario.parts}
     return Agreement(version=mobee.__version__, instance=instance, elsewhere=tuple(elsewhere), services=services)
@@ -109,9 +109,9 @@ def _digest(path: Path) -> str:
 
 
 def request_agreement(session: Session, who: str, endpoint: str) -> Agreement:
-    """Ask the first launcher, at `endpoint`, for its agreement; `who`: name of this launcher.
+    """Return the agreement of the first launcher, whose router is at `endpoint`; `who`: name of this launcher.
 
-    Raises JoinRefused if it does not answer, or has another version.
+    Raises JoinRefused if the first launcher does not answer, or has another version.
     """
     give_up = time.monotonic() + _PATIENCE
     while LAUNCHER not in alive(session) and time.monotonic() < give_up:
@@ -133,8 +133,9 @@ def request_agreement(session: Session, who: str, endpoint: str) -> Agreement:
 def check_agreement(first: Agreement, own: Agreement, only: Collection[str], endpoint: str) -> None:
     """Raise JoinRefused if the agreement of the first host does not fit that of this host.
 
-    `first`, `own`: the two agreements. `only`: services that this host wants to start. The version or the settings may differ, or the first
-    host may not have one of the services, or starts it itself. `endpoint`: address of the first host, for the message.
+    It does not fit if the versions or the settings differ, or if one of the services `only`, which this host wants to start, is not in the
+    scenario of the first host or is started by the first host itself. `first`, `own`: the agreements of the first host and of this host.
+    `endpoint`: address of the first host, for the message.
     """
     if first.version != own.version:
         raise JoinRefused(f"MoBeE is {own.version} here and {first.version} at {endpoint}: install the same version on both hosts")

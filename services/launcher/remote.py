@@ -26,25 +26,26 @@ SERVICES = "services"  # word in the status of the launcher of another host: the
 class Remote:
     """State of a service that another host runs, as this launcher observes it by liveliness tokens and `stat` calls.
 
-    Times are monotonic, in s. `who`: name. `phase`: as of `services.launcher.child.Watched`. `since`: time of the last change of phase.
-    `absent_since`: time at which it was last ready; None: it is ready now, or never was. `instance`: of the present process; empty: none.
-    `known`: instance of the last process. `asked_at`, `answered_at`: times of the last `stat` call and the last answer. `unanswered`: calls
-    in a row without an answer. `reason`: of the last failure.
+    Times are monotonic, in s. `who`: name. `phase`: waiting (for other services), starting, ready, failed (to be restarted), fault (given
+    up) or ended. `since`: time of the last change of phase. `absent_since`: time at which it was last ready; None: it is ready now, or
+    never was. `instance`: id of the present process; empty: there is none. `known`: id of the last process. `asked_at`, `answered_at`:
+    times of the last `stat` call and the last answer. `unanswered`: number of calls in a row without an answer. `reason`: reason of the
+    last failure.
     """
 
     who: str
     vital: bool = True
     phase: Phase = "waiting"
-    since: float = 0.0  # monotonic time of the last change of phase
-    absent_since: float | None = None  # monotonic time at which it was last ready; None: it is ready, or was never
+    since: float = 0.0
+    absent_since: float | None = None
     host: str = ""
-    instance: str = ""  # of the process with a liveliness token; empty: none
-    known: str = ""  # instance of the last process
+    instance: str = ""
+    known: str = ""
     restarts: int = 0
     asking: bool = False
     asked_at: float = 0.0
     answered_at: float = 0.0
-    unanswered: int = 0  # stat calls in a row
+    unanswered: int = 0
     stat: Stat | None = None
     reason: str = ""
 

@@ -69,30 +69,31 @@ class Options:
 
     `scenario`: shipped name or path. `settings`: changes of settings, each "table.field=value". `headless`: without the monitor. `page`:
     with the monitor, even if the scenario has none. `record`: with the recorder, if the scenario has a robot. `cameras`: cameras on links,
-    as in `mobee.robot.cameras`. `duration`: s of real time after all services are ready; None: until the user stops it. `ticks`: in
-    lockstep, number of ticks; None: no limit. `json`: print the summary as JSON. `endpoint`: address of the router; None: that of the
-    scenario. `runs`: parent of the run's folder. `keys`: folder of keys; None: not secured. `insecure`: allow an address that other hosts
-    reach, without keys. `elsewhere`: services that other hosts start. `join`: address of the first host; None: this host is the first.
-    `only`: services that this host starts when it joins. `host`: name of this host when it joins.
+    each as in `services.common.cameras.CameraConfig.cameras`; with them the renderer starts, even if the scenario has none. `duration`: s
+    of real time after all services are ready; None: until the user stops it. `ticks`: in lockstep, number of ticks; None: no limit. `json`:
+    print the summary as JSON. `endpoint`: address of the router; None: that of the scenario. `runs`: parent of the run's folder. `keys`:
+    folder of keys; None: not secured. `insecure`: allow an address that other hosts reach, without keys. `elsewhere`: services that other
+    hosts start. `join`: address of the first host; None: this host is the first. `only`: services that this host starts when it joins.
+    `host`: name of this host when it joins.
     """
 
     scenario: str = "default"
-    settings: tuple[str, ...] = ()  # table.field=value
-    headless: bool = False  # without the monitor
-    page: bool = False  # with the monitor, also if the scenario has none
-    record: bool = True  # with the recorder, if the scenario has a robot
-    cameras: tuple[str, ...] = ()  # on links, see mobee.robot.cameras; with them the renderer starts, also if the scenario has none
-    duration: float | None = None  # s after all services are ready; None: until a stop is requested
-    ticks: int | None = None  # lockstep: number of ticks after which the run ends
+    settings: tuple[str, ...] = ()
+    headless: bool = False
+    page: bool = False
+    record: bool = True
+    cameras: tuple[str, ...] = ()
+    duration: float | None = None
+    ticks: int | None = None
     json: bool = False
     endpoint: str | None = None
     runs: Path = Path("runs")
-    keys: Path | None = None  # folder of keys; with it the system is secured
-    insecure: bool = False  # an address that other hosts reach is allowed without keys
-    elsewhere: tuple[str, ...] = ()  # services that other hosts start
-    join: str | None = None  # endpoint of the system of another host, of which this one starts `only`
+    keys: Path | None = None
+    insecure: bool = False
+    elsewhere: tuple[str, ...] = ()
+    join: str | None = None
     only: tuple[str, ...] = ()
-    host: str = ""  # name of this host, with `join`
+    host: str = ""
 
 
 def launch(options: Options) -> int:

@@ -40,7 +40,7 @@ class Part:
     who: str
     entry: Entry
     config: ServiceConfig
-    given: frozenset[str]  # names of the settings that the scenario file sets
+    given: frozenset[str]
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Scenario:
     title: str
     shared: Mapping[str, Any]
     parts: tuple[Part, ...]
-    where: Callable[[str], str]  # place of a field, for messages
+    where: Callable[[str], str]
 
     @property
     def is_locked(self) -> bool:

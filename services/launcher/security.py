@@ -52,7 +52,10 @@ class Security:
 
 
 class Refusals:
-    """Reports everything that the router refuses as events. The same refusal is reported at most once in 10 s, with its count."""
+    """Publishes an event for everything that the router refuses.
+
+    The same refusal is published at most once in 10 s, with the number of times that it occurred.
+    """
 
     def __init__(self, service: Service, log: RefusalLog) -> None:
         self._service, self._log = service, log

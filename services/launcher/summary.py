@@ -14,7 +14,11 @@ from services.launcher.child import Watched
 def summarise(children: Iterable[Watched]) -> dict[str, Any]:
     """Return the numbers of a run by name, as JSON data; None for a number that was not measured.
 
-    Lengths are in m, times in s, ages in ticks. Counters begin when every service was ready, or at the last restart of their service.
+    "agents": numbers of transitions, timeouts and interruptions and the mean time of an action, of each agent by part. "..._ticks": number
+    of ticks with the event. "rejected_commands": number of refused commands, by reason. "command_age_ticks": percentiles of the age of
+    commands. "lockstep": ticks, speed and repeatability of a run in lockstep. "restarts", "services": restarts and all numbers of each
+    service, by name. Lengths are in m, times in s, ages in ticks. Counters begin when every service was ready, or at the last restart of
+    their service.
     """
     stats = {child.who: child.stat for child in children if child.stat is not None}
     sim, model = _Numbers(stats.get("robot_sim")), _Numbers(stats.get("model"))

@@ -261,9 +261,9 @@ class Supervisor:
         self.report_fault(f"{child.who} {reason}", child.program.vital, f" (its log: {child.program.log})")
 
     def report_fault(self, fault: str, vital: bool, more: str = "") -> None:
-        """Report that a service was given up, and stop the robot if the service is vital.
+        """Publish an event and show on the screen that a service was given up; stop the robot if the service is vital.
 
-        `fault`: service and reason. `more`: text that is added for the user only.
+        `fault`: service and reason. `more`: text that is added on the screen only.
         """
         self.faults.append(fault)
         self._service.bus.event("error", "fault", fault)

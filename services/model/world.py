@@ -31,7 +31,7 @@ MOST_MARGIN = 0.06  # m: an object whose place is less certain is no use as a ta
 
 
 class WorldServer:
-    """Edits the world of a model: by calls of clients, and by the objects that vision perceives."""
+    """Changes the world of a model as clients request by calls, and by the objects that vision perceives."""
 
     def __init__(self, service: Service, model: Model, sigmas: float, ghosts: Collection[str] = ()) -> None:
         """`sigmas`: number of standard deviations of a perceived object's position by which its shape is enlarged.
@@ -68,7 +68,7 @@ class WorldServer:
         return {name: self._in_root_frame(known[name]).position.tolist() for name in sorted(names) if name in known}
 
     def forget(self) -> None:
-        """Remove the objects that vision perceived in the last run; call this at the start of a new one."""
+        """Remove the objects that vision perceived in the last run; call this at the start of a new run."""
         for name in list(self._expiry):
             self._remove(self._model.world, name)
         self._captured.clear()

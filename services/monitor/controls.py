@@ -65,11 +65,11 @@ class Known:
     `motions`, `reaches`: the newest message, by part. `objects`: objects of the model's world, by name.
     """
 
-    gates: dict[str, str] = field(default_factory=dict)  # by part
-    stopped: float = 0.0  # s, monotonic clock: when all parts last reported an emergency stop
+    gates: dict[str, str] = field(default_factory=dict)
+    stopped: float = 0.0
     motions: dict[str, Motion] = field(default_factory=dict)
     reaches: dict[str, Reach] = field(default_factory=dict)
-    objects: dict[str, ObjectState] = field(default_factory=dict)  # of the model's world
+    objects: dict[str, ObjectState] = field(default_factory=dict)
 
 
 @dataclass

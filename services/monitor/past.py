@@ -42,9 +42,10 @@ class Track:
 
 
 class Story:
-    """The record of a run: the values that its page showed.
+    """The record of a run: the values that the monitor's page showed during the run.
 
-    `tracks`: the values, by name. `robot`: the robot of the run. `begin`, `end`: times of the first pose and of the last value [s].
+    `tracks`: the recorded values, by name. `robot`: the robot of the run. `begin`, `end`: times of the first pose and of the last value
+    [s].
     """
 
     def __init__(self, run: Path) -> None:

@@ -24,22 +24,23 @@ class Seen:
     real time without a tick after which the robot counts as not answering. `ended`: the monitor was asked to end.
     """
 
-    clock_age: float | None = None  # s of real time since the last tick; None: there was none
-    mode: str = ""  # of the clock
-    gates: Mapping[str, str] = field(default_factory=dict)  # by part
-    held_for: Mapping[str, float] = field(default_factory=dict)  # s of real time, of the parts in hold
-    why_held: Mapping[str, str] = field(default_factory=dict)  # the controller's reason
-    stop: EStop | None = None  # while it is set
-    services: Collection[str] = ()  # that are up
+    clock_age: float | None = None
+    mode: str = ""
+    gates: Mapping[str, str] = field(default_factory=dict)
+    held_for: Mapping[str, float] = field(default_factory=dict)
+    why_held: Mapping[str, str] = field(default_factory=dict)
+    stop: EStop | None = None
+    services: Collection[str] = ()
     known: Collection[str] = ()  # that have been up: a scenario may have no model or controller
-    patience: float = STALE  # s of real time for which the clock may stand still
-    ended: bool = False  # the monitor was asked to end
+    patience: float = STALE
+    ended: bool = False
 
 
 def banner(seen: Seen) -> dict[str, Any] | None:
-    """Return the warning that the page shows in large letters, as texts `level`, `title`, `text` and `todo` (the remedy).
+    """Return the warning that the page shows in large letters, as a dict of four texts: "level", "title", "text" and "todo".
 
-    Returns None if all is well.
+    "level": kind of warning: ended, waiting, stop, fault, paused or hold. "text": explanation. "todo": remedy. Returns None if there is
+    nothing to warn of.
     """
     names = sorted(seen.services)
     if seen.ended:

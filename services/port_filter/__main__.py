@@ -13,7 +13,7 @@ from services.port_filter.node import FilterNode
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Run the port filter until a signal or a shutdown call."""
+    """Run the port filter, which moves the robot back when a client moves it into contact, until a signal or a shutdown call."""
     config = load_config(Config, argv, "services.port_filter")
     with explained("services.port_filter"):
         robot = robot_of(config)

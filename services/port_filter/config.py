@@ -16,17 +16,22 @@ Seconds = Annotated[float, Meta(ge=0, le=60)]
 
 
 class Config(WorldConfig, frozen=True, kw_only=True):
-    """The port filter's settings. Times are in seconds of simulated time."""
+    """The settings of the port filter, a process between its clients and the robot (thesis chapter 4).
+
+    Its reflex takes control when a motion leads into contact, and moves the robot back along its past poses. Times are in seconds of
+    simulated time.
+    """
 
     clients: Annotated[str, Meta(pattern="^[a-z0-9_]+$")] = "icub_filtered"
     """Namespace (first part of all keys) in which the filter's clients find the robot."""
     participants: list[str] = []
     """In lockstep: names of the clients whose answers every tick waits for."""
     contacts: Literal["solid", "field", "both"] = "both"
-    """Kinds of contact that start the reflex. solid: contacts of the bodies themselves; field: of the larger volumes around them; both:
+    """Kinds of contact that start the reflex. solid: contacts of solid shapes; field: contacts of the larger volumes around them; both:
     either kind."""
     tolerance: Annotated[float, Meta(ge=0)] = math.radians(1.0)
-    """Distance [rad; m for motors that slide] by which a pose may be beyond a motor limit or a clause before this counts as a violation."""
+    """Distance [rad; m for motors that slide] by which a pose may be beyond a motor limit or a clause (a condition on several motors)
+    before this counts as a violation."""
     history: Annotated[float, Meta(gt=0, le=3600)] = _SETTINGS.history
     """Length of the record of past poses [s], along which the reflex can move the robot back."""
     confirm: Seconds = _SETTINGS.confirm

@@ -19,16 +19,19 @@ from services.common.service import CallRefused, Service
 
 @dataclass(frozen=True, slots=True)
 class Owner:
-    """The client that owns the drive of a part, as long as its liveliness token exists. `who`: name. `instance`: id of its process."""
+    """The client that owns the drive of a part (the right to command its motors), as long as its liveliness token exists.
+
+    `who`: name of the client. `instance`: id of its process.
+    """
 
     who: str
     instance: str
 
 
 class DriveServer:
-    """Forwards the drive calls of clients (take, arm, release, hold) to robot_sim, unless the reflex is active.
+    """Forwards the drive calls of clients (take, arm, release, hold) to robot_sim, unless the reflex moves the robot.
 
-    Clients use robot_sim's epochs. `epochs`: the epoch in force, by part.
+    A client gets the epoch (number of the ownership) that robot_sim has given to the filter. `epochs`: the epoch in force, by part.
     """
 
     def __init__(self, service: Service, twin: Service, robot: Robot, refusal: Callable[[], str], on_arm: Callable[[], None]) -> None:

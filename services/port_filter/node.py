@@ -22,8 +22,9 @@ from services.port_filter.passage import Streams
 class Switch:
     """Decides at every tick who commands the robot: the clients, or the reflex.
 
-    `reflex`: the reflex of the present run. `q`: newest measured pose (n,) rad. `violations`: contacts, limits and clauses that it
-    violates.
+    The reflex moves the robot back along its past poses when a motion leads into contact. `reflex`: the reflex of the present run. `q`:
+    newest measured pose (n,) rad. `violations`: the contacts of this pose, and the limits and clauses (conditions on several motors) that
+    it violates.
     """
 
     def __init__(self, config: Config, robot: Robot) -> None:
@@ -51,7 +52,10 @@ class Switch:
 
 
 class FilterNode:
-    """The port filter. `service` is its client of the robot; `twin` acts as the robot in the namespace of the filter's clients."""
+    """The port filter: passes commands of clients to the robot, and moves the robot back if a motion leads into contact.
+
+    `service`: connection to the robot, as a client. `twin`: acts as the robot in the namespace of the filter's clients.
+    """
 
     def __init__(self, service: Service, twin: Service, config: Config, robot: Robot) -> None:
         self._service, self._twin, self._config, self._robot = service, twin, config, robot

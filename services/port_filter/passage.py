@@ -50,7 +50,7 @@ MAX_REMEMBERED = 1000  # commands in transit, at most
 
 
 class CommandStream:
-    """Publishes the commands of one part to robot_sim, with one sequence of numbers for those of clients and of the reflex.
+    """Publishes the commands of one part to robot_sim; commands of clients and of the reflex get numbers of one common sequence.
 
     It remembers which number the client gave to each of its commands.
     """
@@ -70,8 +70,8 @@ class CommandStream:
     def put(self, epoch: int, re_k: int, mode: Mode, reference: list[float], ttl: int) -> None:
         """Publish a command to robot_sim.
 
-        `epoch`: of the drive. `re_k`: tick that it answers. `reference`: positions [rad] or velocities [rad/s] of the part's motors, by
-        `mode`. `ttl`: lifetime [ms].
+        `epoch`: number of the drive's ownership. `re_k`: tick that the command answers. `reference`: positions [rad] or velocities [rad/s]
+        of the part's motors, by `mode`. `ttl`: lifetime [ms].
         """
         self._stream.put(epoch=epoch, re_k=re_k, mode=mode, ref=reference, ttl=ttl)
         self._seq += 1

@@ -22,14 +22,14 @@ _CHUNK = 4_000_000  # bytes; a chunk ends earlier, at every flush
 class Channel:
     """The messages of one key in one encoding. Channels with equal fields are the same channel.
 
-    `topic`: the key. `encoding`: msgpack, json or cdr. `about`: the encoding text on the bus, for messages that are recorded unchanged.
-    `schema`: name of the schema; empty: none. `schema_encoding`, `definition`: format and content of the schema.
+    `topic`: the key. `encoding`: encoding of the messages: msgpack, json or cdr. `about`: the encoding string on the bus, for messages that
+    are recorded unchanged. `schema`: name of the schema; empty: none. `schema_encoding`, `definition`: format and content of the schema.
     """
 
     topic: str
-    encoding: str  # of the messages: msgpack, json or cdr
-    about: str = ""  # the encoding string on the bus, of messages that are recorded as they are
-    schema: str = ""  # name; empty: none
+    encoding: str
+    about: str = ""
+    schema: str = ""
     schema_encoding: str = ""
     definition: bytes = b""
 

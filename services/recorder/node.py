@@ -91,9 +91,9 @@ PER_TICK: tuple[type[Message], ...] = (
 def queues(everything: bool, locked: bool) -> dict[str, int]:
     """Return the key expressions of the streams to record, each with the number of messages that may wait in its queue.
 
-    `everything`: also the streams in FOR_SUBSCRIBERS. `locked`: sizes for lockstep. Streams with few messages get short queues: Zenoh
-    allocates 0.25 kB per place, and the memory of each place is used when the first message is put there, so a long queue would grow for
-    hours.
+    `everything`: also the streams in FOR_SUBSCRIBERS. `locked`: True: the sizes for lockstep. Streams with few messages get short queues:
+    Zenoh allocates 0.25 kB per place, and the memory of each place is used when the first message is put there, so a long queue would grow
+    for hours.
     """
     most, others = (LOCKED_CAPACITY, OTHER_LOCKED_CAPACITY) if locked else (CAPACITY, OTHER_CAPACITY)
     recorded = (cls for cls in streams() if everything or cls not in FOR_SUBSCRIBERS)
@@ -110,7 +110,7 @@ def frequent_keys(parts: Iterable[str], everything: bool) -> list[str]:
 
 
 class RecorderNode:
-    """Writes all messages unchanged, and copies of some for viewers."""
+    """Writes all messages unchanged, and copies of some of them, in JSON or as ROS 2 messages, for viewers."""
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:
         self._service, self._folder, self._keep_free = service, Path(config.run_dir), int(config.keep_free * _MEGABYTE)

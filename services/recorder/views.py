@@ -30,7 +30,7 @@ _tick = msgspec.msgpack.Decoder(Tick)
 
 
 class Views:
-    """Makes the copies of recorded messages that viewers show."""
+    """Makes copies of recorded messages, in JSON or as ROS 2 messages, which viewers can show."""
 
     def __init__(self, robot: Robot, pose_rate: float, json_rate: float) -> None:
         """Create the encoders.
@@ -43,7 +43,7 @@ class Views:
         self._pose_due, self._json_due = _Due(pose_rate), _Due(json_rate)
 
     def of(self, message: Raw, kind: str) -> Iterator[Copy]:
-        """Yield the copies of a message, each with its channel.
+        """Yield the copies of a recorded message, each with the channel to which it is written.
 
         `kind`: name of the message's type. A message that cannot be decoded has no copies.
         """

@@ -31,7 +31,7 @@ class BulletBackend:
     def __init__(self, robot: Robot, load_world: Callable[[], World], parameters: MotorParameters, seed: int, dt: float) -> None:
         """Build the robot and its world.
 
-        `load_world`: returns a new world. `seed`: of the noise. `dt`: the tick, s. Raises BackendUnavailable or MobeeError.
+        `load_world`: returns a new world. `seed`: of the encoder noise. `dt`: the tick, s. Raises BackendUnavailable or MobeeError.
         """
         self._robot, self._load_world, self._parameters = robot, load_world, parameters
         self._substeps = parameters.substeps(dt)
@@ -40,7 +40,7 @@ class BulletBackend:
         self._build(seed)
 
     def reset(self, seed: int) -> None:
-        """Put the robot at home, at rest, with all motors in hold, and the world in its initial state; `seed`: of the noise."""
+        """Put the robot at home, at rest, with all motors in hold, and the world in its initial state; `seed`: of the encoder noise."""
         self._scene.close()
         self._build(seed)
 

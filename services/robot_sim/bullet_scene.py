@@ -27,14 +27,19 @@ TABLE = "table"  # in the list it stands for every obstacle of the world
 
 
 class SolidPairs(Struct, frozen=True, forbid_unknown_fields=True):
-    """The list of pairs of links whose contacts count as solid contacts, and how the list was made."""
+    """The list of pairs of links whose contacts count as solid contacts, and how the list was made.
 
-    model: str  # of icub-models
-    distance: float  # m, from which on two hulls count as apart
-    poses: int  # number of random poses within the limits, in all of which the hulls of each pair were apart
+    `always`: pairs that are listed in any case: hands and forearms against torso, head, other arm and table. `apart`: the other pairs,
+    whose convex hulls were at least `distance` [m] apart in all of `poses` random poses within the limits, drawn with the seed `seed`.
+    `model`: the robot's name in icub-models.
+    """
+
+    model: str
+    distance: float
+    poses: int
     seed: int
-    always: list[list[str]]  # listed for all poses: hands and forearms against torso, head, other arm, table
-    apart: list[list[str]]  # the other pairs, found by the random poses
+    always: list[list[str]]
+    apart: list[list[str]]
 
     def links(self) -> set[frozenset[str]]:
         """Return the listed pairs of two links of the robot, as sets of two names."""

@@ -16,24 +16,30 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """The equation of motion of the d driven joints at present: mass * acceleration + bias = torques of the joints and of contacts."""
+    """The equation of motion of the d driven joints at present: mass * acceleration + bias = torques of the joints and of contacts.
 
-    mass: Array  # (d, d) kg m^2
-    bias: Array  # (d,) N m, gravity and Coriolis torques
-    velocity: Array  # (d,) rad/s
+    `mass`: (d, d) kg m^2. `bias`: (d,) N m, gravity and Coriolis torques. `velocity`: (d,) rad/s.
+    """
+
+    mass: Array
+    bias: Array
+    velocity: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Share:
-    """The command of each of the d joints in a substep: a torque if the joint is `free`, otherwise a velocity; all arrays (d,)."""
+    """The command of each of the d joints in a substep: a torque if the joint is `free`, otherwise a velocity; all arrays (d,).
+
+    `torque`: N m, torque behind the gear; 0 for a joint that is not free. `velocity`: rad/s.
+    """
 
     free: Mask
-    torque: Array  # N m, passed on by the gear; 0 where not free
-    velocity: Array  # rad/s
+    torque: Array
+    velocity: Array
 
 
 class Gears:
-    """Computes the torques that gears pass on to joints: solves a substep of motor, gear and arm together, implicitly.
+    """Computes the torques that gears transmit to joints: solves a substep of motor, gear and arm together by an implicit method.
 
     A geared motor adds its rotor's inertia and its friction to its joint: (M + INERTIA) a = torque - FRICTION v - bias + outside. Both are
     far larger than the inertia of a wrist, so an explicit step of 5 ms would diverge. The external torque `outside` (contacts) is taken

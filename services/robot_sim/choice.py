@@ -22,7 +22,10 @@ WITHOUT_PHYSICS = (
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """The chosen back-end, and a message for the user if the choice may be unexpected; empty if it is not."""
+    """The chosen back-end.
+
+    `name`: pybullet, mujoco or kinematic. `warning`: text for the user if the choice may be unexpected; otherwise empty.
+    """
 
     name: Name
     warning: str = ""

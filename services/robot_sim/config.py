@@ -72,7 +72,7 @@ class Config(WorldConfig, frozen=True, kw_only=True):
         return {} if self.backend == "auto" else dict.fromkeys(PACKAGES[self.backend], EXTRA)
 
     def check_robot(self, robot: Robot) -> None:
-        """Check the robot as every service does, and whether the back-end can move it with these motors; raises MobeeError.
+        """Raise MobeeError if the back-end cannot move the robot with these motors, or if a part's name cannot be used on the bus.
 
         With `motors` = "identified", parameters must exist for this robot. Each pattern of `torques` must match a motor.
         """
@@ -87,7 +87,8 @@ class RendererConfig(WorldConfig, frozen=True, kw_only=True):
     """The renderer's settings."""
 
     cameras: tuple[str, ...] = ()
-    """Further cameras, beside the first two of the robot, as in the settings of vision."""
+    """Further cameras, beside the first two of the robot's file; each as in `services.common.cameras.CameraConfig.cameras`, for example
+    NAME, the name of a camera in the file, a link or a marker."""
     frame_rate: Annotated[float, Meta(gt=0, le=30)] = 5.0
     """Number of pictures of each camera per second of simulated time."""
     width: Annotated[int, Meta(ge=16, le=1280)] = 320
@@ -104,7 +105,10 @@ class RendererConfig(WorldConfig, frozen=True, kw_only=True):
     """Marker on which a tag is drawn, for `mobee calibrate`; empty: none."""
 
     def check_robot(self, robot: Robot) -> None:
-        """Check the robot as every service does, that it has a camera and the marker `tag`, and the size of pictures; raises MobeeError."""
+        """Raise MobeeError if the robot has no camera or no marker `tag`, or if a part's name cannot be used on the bus.
+
+        It is also raised if `optics` is "dragonfly" and the pictures do not have 320 x 240 pixels.
+        """
         super().check_robot(robot)
         require_cameras(robot, cameras_of(robot, self.cameras), 1)
         if self.tag:

@@ -27,14 +27,18 @@ from services.common.service import CallRefused
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Limits:
-    """Limits of the motors of a part, each of shape (n_part,)."""
+    """Limits of the motors of a part, each of shape (n_part,).
 
-    lower: Array  # rad
-    upper: Array  # rad
-    velocity: Array  # rad/s
-    acceleration: Array  # rad/s^2
-    torque: Array  # N m
-    fine: Array  # what 1 rad of a threshold is in the unit of the motor (mobee.robot.motor_units); 1 for motors that turn
+    `lower`, `upper`: rad. `velocity`: rad/s. `acceleration`: rad/s^2. `torque`: N m. `fine`: the length by which a threshold of 1 rad is
+    replaced for a motor that slides (`mobee.robot.motor_units`); 1 for motors that turn.
+    """
+
+    lower: Array
+    upper: Array
+    velocity: Array
+    acceleration: Array
+    torque: Array
+    fine: Array
 
     @classmethod
     def of(cls, robot: Robot, part: str) -> Limits:
@@ -51,7 +55,12 @@ class Limits:
 
 
 class Order(Struct, frozen=True, eq=False):
-    """A command to one part, as it arrived in `Command` or `Commands`. `reference`: (n_part,) rad, rad/s or N m, by mode."""
+    """A command to one part, as it arrived in `Command` or `Commands`.
+
+    `src`, `seq`: sender and its number of the message. `epoch`: number of the sender's ownership. `re_k`: tick that the command answers.
+    `reference`: (n_part,) rad, rad/s or N m, by `mode`. `ttl`: in free mode, time from the start of that tick after which the command ends,
+    ms.
+    """
 
     src: str
     epoch: int
@@ -59,7 +68,7 @@ class Order(Struct, frozen=True, eq=False):
     re_k: int
     mode: Mode
     reference: Array
-    ttl: int  # ms
+    ttl: int
 
     @classmethod
     def of(cls, command: Command) -> Order:
@@ -114,7 +123,7 @@ class Admission:
         self._most_strides = max_ticks or max(round(MAX_AGE / dt), 1)
 
     def check(self, order: Order, k: int) -> None:
-        """Check the numbers, the age and the ttl of an order that arrives in tick k."""
+        """Raise Refused if an order that arrives in tick k is not valid: number and limits of its references, age in ticks, or ttl [ms]."""
         reference = order.reference
         if reference.shape != self._lower.shape:
             raise Refused("length", f"{self._part}: {reference.size} numbers for {self._lower.size} motors")
@@ -226,18 +235,18 @@ HOLD = Drive("hold")
 
 
 class InForce(Struct, frozen=True):
-    """A command that was accepted, and the time at which it ends."""
+    """A command that was accepted, and the time at which it ends, `expires`, ns of the monotonic clock."""
 
     order: Order
-    expires: int  # ns, monotonic clock
+    expires: int
 
 
 class Gate:
     """The safety gate of one part, the last check before its motors.
 
-    States: idle (no owner), hold, armed, fault, estop; the part moves only when armed. Commands are admitted between ticks; `tick` returns
-    what the motors do. A command is in force until the next one, or until its ttl is over; then the part brakes at full deceleration, holds
-    where it came to rest, and must be armed again.
+    States: idle (no owner), hold, armed, fault, estop; the part moves only when armed. Each new owner gets a new epoch, a number that its
+    calls and commands must contain. Commands are admitted between ticks; `tick` returns what the motors do. A command is in force until the
+    next one, or until its ttl is over; then the part brakes at full deceleration, holds where it came to rest, and must be armed again.
     """
 
     def __init__(

@@ -25,12 +25,12 @@ class BackendUnavailable(InvalidValue):
 
 @dataclass(frozen=True, slots=True)
 class SolidContact:
-    """The deepest solid contact of a tick. `pair`: the two sorted names with a blank between them.
+    """The deepest solid contact of a tick. `depth`: m. `pair`: the two sorted names with a blank between them.
 
     Without a contact, depth is 0 and pair empty.
     """
 
-    depth: float = 0.0  # m
+    depth: float = 0.0
     pair: str = ""
 
 
@@ -76,7 +76,7 @@ class Backend(Protocol):
         ...
 
     def reset(self, seed: int) -> None:
-        """Put the robot at home, at rest, with all motors in hold, and the world in its initial state; `seed`: of the noise."""
+        """Put the robot at home, at rest, with all motors in hold, and the world in its initial state; `seed`: of the encoder noise."""
         ...
 
     def place(self, name: str, position: tuple[float, float, float]) -> None:
@@ -107,7 +107,7 @@ class KinematicBackend:
         self.reset(seed)
 
     def reset(self, seed: int) -> None:
-        """Put the robot at home, at rest, with all motors in hold, and the world in its initial state; `seed`: of the noise."""
+        """Put the robot at home, at rest, with all motors in hold, and the world in its initial state; `seed`: of the encoder noise."""
         self.motors = Motors(self._robot, self._parameters, seed, self._robot.home)
         self.world = self._load_world()
         self.notes: Sequence[str] = unmoved(self.world)

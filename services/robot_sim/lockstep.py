@@ -73,7 +73,11 @@ class Lockstep:
         return self._service.bus.k * dt / max(self._answered - self._began, 1e-9)
 
     def numbers(self) -> Mapping[str, float]:
-        """Return the numbers of the run for `stat`: tick, number of flaws, and whether the last tick is reached."""
+        """Return the numbers of the run, by name, for the call `stat`.
+
+        "tick": number of the present tick. "flaws": number of events that made the run unrepeatable. "arrived": whether the last tick is
+        reached.
+        """
         return {"tick": self._service.bus.k, "flaws": self.flaws, "arrived": self.is_over()}
 
     def _note(self, who: str, why: str) -> None:

@@ -16,9 +16,10 @@ from services.robot_sim.watch import Recorded
 
 
 def make_backend(config: Config, robot: Robot) -> Backend:
-    """Return the back-end that the configuration names, which also records if the setting `record` names a folder.
+    """Return the back-end that the configuration names.
 
-    Raises BackendUnavailable or MobeeError.
+    If the setting `record` names a folder, the back-end also writes the true joint positions and the contacts of every tick there. Raises
+    BackendUnavailable or MobeeError.
     """
     backend = _make_backend(config, robot)
     return Recorded(backend, Path(config.record)) if config.record else backend

@@ -34,7 +34,7 @@ class MujocoBackend:
     def __init__(self, robot: Robot, load_world: Callable[[], World], parameters: MotorParameters, seed: int, dt: float) -> None:
         """Build the robot and its world.
 
-        `load_world`: returns a new world. `seed`: of the noise. `dt`: the tick, s. Raises MobeeError.
+        `load_world`: returns a new world. `seed`: of the encoder noise. `dt`: the tick, s. Raises MobeeError.
         """
         self._robot, self._load_world, self._parameters = robot, load_world, parameters
         self._substeps = parameters.substeps(dt)
@@ -46,7 +46,7 @@ class MujocoBackend:
         self.reset(seed)
 
     def reset(self, seed: int) -> None:
-        """Put the robot at home, at rest, with all motors in hold, and the world in its initial state; `seed`: of the noise."""
+        """Put the robot at home, at rest, with all motors in hold, and the world in its initial state; `seed`: of the encoder noise."""
         self._world = self._load_world()
         self.motors = Motors(self._robot, self._parameters, seed, self._robot.home)
         self._scene = MujocoScene(self._robot, self._world, self._substep)

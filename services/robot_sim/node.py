@@ -36,11 +36,11 @@ MAX_PAUSE = 600.0  # s after which a pause ends by itself
 class Pause(Struct, frozen=True):
     """A pause of the robot's time. `by`: name of the process that has requested the pause.
 
-    `until`: time at which the pause ends by itself.
+    `until`: time at which the pause ends by itself, s of the monotonic clock.
     """
 
     by: str
-    until: float  # monotonic clock
+    until: float
 
 
 class Node:

@@ -94,7 +94,11 @@ class ImperfectCameras:
         return [self._true_at(t + moment) for moment in self._cameras.moments]
 
     def draw(self, name: str, postures: list[Array]) -> Picture:
-        """Return the picture of the camera `name` for an exposure; `postures`: the true postures in it, as `postures` returns them."""
+        """Return the picture that the camera `name` takes in one exposure.
+
+        `postures`: true postures at several moments of the exposure, as the method `postures` returns them; the picture is blurred by the
+        motion.
+        """
         return self._cameras.expose(name, postures)
 
     def stamp(self, t: float) -> Stamp:

@@ -126,13 +126,13 @@ class Sensors:
     def publish(self, mode: Literal["free", "lock", "paused"], dt: int, rate: float) -> None:
         """Publish the start of the tick (`Tick`), if every part has been read.
 
-        `mode`: as in `Clock`. `dt`: the tick, ns. `rate`: simulated seconds per second of real time.
+        `mode`: free, lock (lockstep) or paused. `dt`: the tick, ns. `rate`: simulated seconds per second of real time.
         """
         if len(self._statuses) == len(self._where):
             self._tick.put(dt=dt, mode=mode, rate=rate, q=self._q.tolist(), parts=self._statuses)
 
     def digest(self) -> None:
-        """Add the samples of this tick to the hash."""
+        """Add the samples of this tick to the SHA-256 of the run, `hash`."""
         for part, status in self._statuses.items():
             where = self._where[part]
             self._hash.update(self._q[where].tobytes() + self._dq[where].tobytes() + f"{status.mode} {status.gate}".encode())

@@ -70,7 +70,7 @@ class Stops:
 
 
 class Counters:
-    """The counts of one measurement."""
+    """Counts of ticks, commands, contacts and stops since a measurement began."""
 
     def __init__(self) -> None:
         self.ticks = 0
@@ -119,9 +119,12 @@ class Counters:
         return -1.0
 
     def numbers(self, missed: int, pairs_watched: int) -> Mapping[str, float]:
-        """Return the counts for `stat`, by name. `missed`: number of ticks skipped since the start of the process.
+        """Return the counts for `stat`, by name.
 
-        `pairs_watched`: number of pairs that the back-end tests for contact.
+        Names with "ticks" are numbers of ticks. "age_...": age of commands [ticks]. "solid_depth_max" and "gap_min": deepest contact and
+        smallest distance [m]. "stops": number of stops, "stop_time_max" and "stop_distance_max": their largest time [s] and distance [rad].
+        "overtime_ms_...": delay of a tick's start after its deadline. "tick_ms_...": computing time of a tick. `missed`: number of ticks
+        skipped since the start of the process. `pairs_watched`: number of pairs that the back-end tests for contact.
         """
         return {
             "ticks": self.ticks,
@@ -187,7 +190,7 @@ class Recorded:
             self._contacts.write(f"{self._k},{pair},{depth:.6g}\n")
 
     def reset(self, seed: int) -> None:
-        """Reset the recorded back-end as `Backend.reset` does, and empty the files."""
+        """Put the robot at home and the world in its initial state, and empty the files; `seed`: of the encoder noise."""
         self._inner.reset(seed)
         self._begin()
 

@@ -11,7 +11,7 @@ from services.vision.node import VisionNode
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Run the locator until a signal or a shutdown call."""
+    """Run the locator, which finds things in the pictures of two cameras, until a signal or a shutdown call."""
     run_node("services.vision", Config, VisionNode, argv)
 
 

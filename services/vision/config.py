@@ -18,9 +18,9 @@ from services.common.worlds import world_around
 
 
 class Config(CameraConfig, frozen=True, kw_only=True):
-    """The settings of the locator.
+    """The settings of the locator, which finds things in the pictures of two cameras and publishes their positions.
 
-    It uses the first two cameras, and looks for what the targets of the world look like, wherever they are.
+    It uses the first two cameras. It looks for things with the shapes and colours of the targets in the world's file, at any position.
     """
 
     world: str = ""
@@ -29,7 +29,7 @@ class Config(CameraConfig, frozen=True, kw_only=True):
     """What finds things in a picture: color (their colours), a file of `mobee detector train`, or module:name of a function that returns a
     detector."""
     most: Annotated[int, Meta(ge=1, le=100)] = 1
-    """Largest number of objects of each thing that get a name: NAME, NAME_2, ..."""
+    """Largest number of objects of each thing (kind of object) that get a name: NAME, NAME_2, ..."""
     calibration: str = ""
     """File of `mobee calibrate`; empty: cameras and encoders are assumed to have no errors."""
     encoder_noise: Annotated[float, Meta(ge=0, le=0.1)] = 0.0025
@@ -59,9 +59,9 @@ class Config(CameraConfig, frozen=True, kw_only=True):
         return found
 
     def check_robot(self, robot: Robot) -> None:
-        """Check the robot as every service does, that it has two cameras, and that there is something to look for; raises MobeeError.
+        """Raise MobeeError if the robot has fewer than two cameras, or if the world contains nothing to look for.
 
-        The detector and the calibration must be usable too.
+        It is also raised if the detector or the calibration cannot be used, or if a part's name cannot be used on the bus.
         """
         super().check_robot(robot)
         require_cameras(robot, self.cameras_on(robot), STEREO)

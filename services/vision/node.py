@@ -37,7 +37,7 @@ DIGITS = 3  # of published sizes, m: the model need not make a new shape in each
 class VisionNode:
     """Locates things in the pictures of two cameras, when both pictures and both camera messages of a tick have arrived.
 
-    It reads no other stream of the robot.
+    Besides these it reads only the clock.
     """
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:

@@ -19,14 +19,17 @@ LEAST_KNOWN = 0.05  # share at the top of the curves' axis, at least
 
 
 class StoryView:
-    """Draws the cards and the curves of at most MOST (3) agents."""
+    """Draws a card and a learning curve for each of at most MOST (3) agents.
+
+    A card is a panel with text: the agent's present action, the outcome of the last action, and how much the agent knows.
+    """
 
     def __init__(self, colors: Mapping[str, Color], fonts: Fonts) -> None:
         """Create the view; `colors`: colour of each part."""
         self._colors, self._fonts = colors, fonts
 
     def draw(self, ink: Any, values: dict[str, Any], box: tuple[int, int, int, int]) -> None:
-        """Draw the cards and the curves.
+        """Draw the cards of the agents, one below the other, and below them a panel with their learning curves.
 
         `ink`: drawing context of Pillow. `values`: recorded values at one time, as of `services.monitor.past.Story.at`. `box`: left, top,
         right and bottom [pixels].

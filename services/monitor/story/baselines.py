@@ -21,7 +21,8 @@ LONGEST = 10_000  # transitions that are simulated: 0.4 s of a core
 SEED = 0
 
 Curve = list[tuple[int, float, float]]
-"""A learning curve, as points (number of transitions, share of the state-actions that were tried, share that are predictable)."""
+"""A learning curve, as points (number of transitions, share of the state-actions that were tried, share that are predictable). A
+state-action is predictable if it was tried at least twice, with the same outcome in at least 80 % of the tries."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -59,7 +59,7 @@ class _Agent:
 
 
 class Teller:
-    """The stories of all agents: actions, outcomes, knowledge and reaches.
+    """Makes the texts and values that the page shows about all agents: their actions, outcomes, knowledge and reaches.
 
     `changed`: names of the values that have changed since the last call of `values`.
     """
@@ -104,8 +104,8 @@ class Teller:
     def note_learned(self, learned: Learned) -> None:
         """Store the knowledge that an agent has published.
 
-        Its learning curve gets a point; the baselines are simulated again if the agent has made 10 % more transitions since the last
-        simulation.
+        A point is added to the agent's learning curve. The baselines (learning curves of other explorers) are simulated again if the agent
+        has made 10 % more transitions since the last simulation.
         """
         agent = self._agent(learned.agent)
         if agent is None:

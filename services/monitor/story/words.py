@@ -28,7 +28,7 @@ def title_of(name: str) -> str:
 
 
 def joint_words(name: str, part: str, robot: Robot) -> str:
-    """Return the name of a motor in words, without redundant ones.
+    """Return the name of a motor in words, without words that say nothing new.
 
     For example, l_shoulder_pitch of left_arm becomes "shoulder pitch", and panda_joint1 becomes "joint 1". The name of the part, a prefix
     for the side (such as l_), or else the prefix that all motors of the robot share is removed.

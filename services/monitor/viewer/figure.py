@@ -68,9 +68,9 @@ def _mesh(points: Array, color: Rgba) -> rr.Mesh3D:
 
 
 def drawn_link(solids: Sequence[LinkSolid]) -> Iterator[tuple[str, rr.AsComponents]]:
-    """Yield (name, components) of each Rerun entity that draws the solids of one link, in the root frame with every joint at zero.
+    """Yield (name, components) of each Rerun entity that draws the volumes and meshes `solids` of one link, with every joint at zero.
 
-    All opaque meshes together are one entity.
+    They are in the root frame. All opaque meshes together are one entity.
     """
     opaque = [one.solid for one in solids if one.solid.mesh is not None and one.solid.opacity >= 1.0]
     if opaque:
@@ -113,8 +113,8 @@ PUSH, LONGEST = 5.0, 0.15  # length of a contact's arrow: in depths, and at most
 class Figure:
     """Logs a robot and its world to a Rerun stream, then its poses over time.
 
-    A link is drawn by its visuals, and its solids are shown only while they are in contact. `solids`: True: always draw the solids, never
-    the visuals.
+    A link is drawn by its visuals (the surfaces in the robot file). Its solids (the volumes by which contacts are found) are shown only
+    while they are in contact. `solids`: True: always draw the solids, never the visuals.
     """
 
     def __init__(self, stream: rr.RecordingStream, robot: Robot, world: World | None, solids: bool = False) -> None:

@@ -54,14 +54,14 @@ class LaterControls:
         self.real: Controls = NoControls()
 
     def do(self, page: str, verb: str, arguments: dict[str, Any]) -> str:
-        """Execute a command of a page by `real` and return a sentence for the user, as in `services.monitor.web.server.Controls.do`.
+        """Let `real` execute the command `verb` of the page with the id `page`; return a sentence for the user.
 
-        Raises Refused.
+        `arguments`: values of the command, by name. Raises Refused if it cannot be executed.
         """
         return self.real.do(page, verb, arguments)
 
     def tend(self, open_pages: set[str]) -> None:
-        """Pass the ids of the open pages to `real`, as in `services.monitor.web.server.Controls.tend`."""
+        """Pass the ids of the open pages to `real`, which gives back the parts of pages that are not open any more."""
         self.real.tend(open_pages)
 
 

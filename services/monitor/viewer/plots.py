@@ -50,7 +50,8 @@ class Plots:
     def log_forces(self, forces: Forces) -> None:
         """Log the norm of each force term over all motors of the robot [rad/s^2].
 
-        The terms come from two senders, model and controller; of the other sender's terms the newest norms are logged again.
+        Model and controller each send some of the terms. With a message of one sender, the newest norms of the other's terms are logged
+        again.
         """
         known = len(self._strengths)
         self._strengths |= {name: float(np.linalg.norm(row)) for name, row in forces.terms.items()}

@@ -51,6 +51,7 @@ HANDS = {"left_palm": palette.PARTS["left_arm"], "right_palm": palette.PARTS["ri
 class Scene:
     """Logs the robot, its fields, the trails of its hands and the objects to a Rerun stream.
 
+    Fields are larger volumes around links, whose contacts cause repulsive forces. A trail is a line through the last positions of a hand.
     The geometry of the links is logged once, then only their poses.
     """
 
@@ -65,7 +66,7 @@ class Scene:
         self._links = Links(stream, robot)
 
     def show_fields(self, shown: bool) -> None:
-        """Show or hide the robot's fields, from the next update on."""
+        """Show or hide the robot's fields (volumes that cause repulsive forces), from the next update on."""
         self._fields = [shape for shape in self._robot.shapes if shape.role == "field"] if shown else []
 
     def forget(self) -> None:
@@ -74,7 +75,10 @@ class Scene:
             trail.clear()
 
     def log_robot(self, q: Array, contacts: list[ContactItem]) -> None:
-        """Log the robot in the pose `q` (n,) rad. Fields that are named in one of the contacts are red."""
+        """Log the robot in the pose `q` (n,) rad, with its fields, the volumes that cause repulsive forces.
+
+        A field that is named in one of the contacts is red.
+        """
         transforms = link_transforms(self._robot, q)
         self._links.move(transforms)
         self._log_fields(transforms, {name for c in contacts for name in (c.first, c.second)})

@@ -93,8 +93,8 @@ def view(
     """Show a motion of a robot on a page until the user interrupts with Ctrl-C, or save it to a file.
 
     `world`: objects around the robot. `save`: file to write (.rrd); None: show a page. `report` is called with the page's address when all
-    data are logged. `stretches`: sections of the motion; None: a sweep through the ranges of all motors. `solids`: draw the solids instead
-    of the visuals of the robot file.
+    data are logged. `stretches`: sections of the motion; None: a sweep through the ranges of all motors. `solids`: draw the solids (volumes
+    by which contacts are found) instead of the visuals (surfaces in the robot file).
     """
     with tempfile.TemporaryDirectory(prefix="mobee-view-") as private:
         file = Path(private) / "view.rrd" if save is None else save

@@ -20,10 +20,11 @@ DIGITS = 4  # of lengths in m
 
 
 def shapes_of(robot: Robot, colors: dict[str, Color]) -> list[dict[str, Any]]:
-    """Return all shapes of a robot as JSON data: link, kind, size [m], position [m], rotation (3 x 3), part, name.
+    """Return all shapes of a robot as JSON data: a dict with "link", "kind", "size", "position", "rotation", "part" and "name" for each.
 
-    Shapes are placed as with every joint at zero, in the root frame. "part": index of the part in `colors`, -1: no part. "field": True,
-    only if the shape is a field. "vertices": [m], only of a convex shape.
+    "link": index of the link. "size", "position": [m]. "rotation": (3, 3). Shapes are placed as with every joint at zero, in the root
+    frame. "part": index of the part in `colors`; -1: none. "field": True, only if the shape is a field, that is, not solid but a volume
+    that causes a repulsive force. "vertices": (v, 3) m, only of a convex shape.
     """
     return [_shape(shape, list(colors)) for shape in robot.shapes]
 

@@ -42,13 +42,16 @@ class Controls(Protocol):
     """Executes the commands of the page."""
 
     def do(self, page: str, verb: str, arguments: dict[str, Any]) -> str:
-        """Execute the command `verb` of the page with the id `page`, and return a sentence for the user.
+        """Execute the command `verb` (such as "stop") of the page with the id `page`, and return a sentence for the user.
 
-        Raises Refused if it cannot be executed.
+        `arguments`: values of the command, by name. Raises Refused if it cannot be executed.
         """
 
     def tend(self, open_pages: set[str]) -> None:
-        """Do the regular work; called once per second with the ids of the open pages."""
+        """Do the regular work, such as to give back the parts of pages that are not open any more; called once per second.
+
+        `open_pages`: ids of the open pages.
+        """
 
 
 class Frames(Protocol):
@@ -57,7 +60,8 @@ class Frames(Protocol):
     def newest(self, after: int, patience: float) -> bytes:
         """Return the encoded data that a viewer needs after it has shown frame `after`; wait at most `patience` s for a newer frame.
 
-        Format: `services.monitor.viewer.frames.Frames.newest`.
+        The bytes contain the number and time of the frame, and pieces of Rerun data; the format is described at
+        `services.monitor.viewer.frames.Frames.newest`.
         """
 
 
@@ -65,13 +69,13 @@ class Frames(Protocol):
 class Pages:
     """The open pages. Each page chooses an id, which is the key of all fields.
 
-    `seen`: monotonic time of its last request [s]. `shown`: version of the board that it has shown. `late`: delay of the body and of the 3D
-    view that it shows [s of robot time]. `lock`: protects the fields.
+    `seen`: monotonic time of its last request [s]. `shown`: newest version of the board (the values of the page) that it has shown. `late`:
+    delay of the body and of the 3D view that it shows [s of robot time]. `lock`: protects the fields.
     """
 
-    seen: dict[str, float] = field(default_factory=dict)  # monotonic clock of the last request
+    seen: dict[str, float] = field(default_factory=dict)
     shown: dict[str, int] = field(default_factory=dict)
-    late: dict[str, dict[str, float]] = field(default_factory=dict)  # s of robot time: of the page, of its 3D view
+    late: dict[str, dict[str, float]] = field(default_factory=dict)
     lock: threading.Lock = field(default_factory=threading.Lock)
 
     def note(self, page: str, shown: int, late: dict[str, float]) -> None:
