@@ -163,9 +163,10 @@ def _git(*words: str) -> None:
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """Run this benchmark and return the result of `measure_checkouts`; raises AgainstFailed.
+    """Run this benchmark and return its result; raises AgainstFailed.
 
-    If a checkout is given as a commit, its native core is built first.
+    If a checkout is given as a commit, its native core is built first.  Main keys: "cases", for each case the times of both checkouts and
+    their ratio, as `compared` returns them; "requirements", the list of judged requirements, each a dict; "passed", whether all are met.
     """
     with checkout(settings.old, settings.old_python) as old, checkout(settings.new) as new:
         for given, one in ((settings.old, old), (settings.new, new)):
@@ -177,7 +178,9 @@ def measure(settings: Settings) -> dict[str, Any]:
 def measure_checkouts(old: Checkout, new: Checkout, cases: Sequence[str], rounds: int) -> dict[str, Any]:
     """Measure the cases in two checkouts by turns and return the result; raises AgainstFailed.
 
-    Keys: "rounds"; "cases", the result of `compared` by case; "requirements" and "passed", as of `verdicts.verdict`.
+    `cases`: names in `against_cases.CASES`.  Keys: "rounds", their number; "cases", for each case the times of both checkouts and their
+    ratio, as `compared` returns them; "requirements", the list of judged requirements, each a dict, for each case that the new checkout is
+    not slower than the old one; "passed", whether all are met.
     """
     pairs: dict[str, list[Pair]] = {case: [] for case in cases}
     with Progress() as progress:

@@ -35,7 +35,10 @@ Observed = Mapping[str, Sequence[Transition]]  # of each part
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """What is run.  `actions`: about how many actions of all agents are compared.  `seed`: of the agents and of the encoder noise."""
+    """Settings of the benchmark.
+
+    `actions`: about how many actions of all agents are compared.  `seed`: seed of the agents and of the encoder noise.
+    """
 
     actions: int = 100
     seed: int = 0

@@ -43,9 +43,10 @@ class Agreement:
     """Comparison of the model's contacts with those of one peer, over all poses of a scene.
 
     `contacts`: number of the model's contacts.  `other_pairs`: number of contacts that only one of the two programs finds; `deepest_other`:
-    depth of the deepest one [m].  `depth_difference`: largest difference of depths [m], by kinds of volumes ("box-capsule").
-    `same_depths`: share of the contacts whose depths differ by at most DEPTH_TOLERANCE (1e-9 m).  `beaten`: largest excess [m] of our depth
-    over the separation along the peer's normal.
+    depth of the deepest such contact [m], 0 if there is none.  `depth_difference`: largest difference between the depths of both programs
+    [m], by kinds of volumes ("box-capsule").  `same_depths`: share of the contacts whose depths differ by at most DEPTH_TOLERANCE (1e-9 m).
+    `beaten`: how much [m] the volumes of a contact can be separated by a shorter motion than the model's depth, if they move along the
+    peer's normal: the largest difference, 0 if there is none; the model's depth should be the minimum.
     """
 
     peer: str
@@ -53,19 +54,19 @@ class Agreement:
     objects: int
     poses: int
     contacts: int
-    other_pairs: int  # found by one of the two only
-    deepest_other: float  # m, depth of the deepest such pair
-    depth_difference: dict[str, float]  # m, greatest by kinds, "box-capsule"
-    same_depths: float  # share of the contacts in which they differ by no more than DEPTH_TOLERANCE
-    beaten: float  # m, by how much the separation along a normal of the peer's is less, at most
+    other_pairs: int
+    deepest_other: float
+    depth_difference: dict[str, float]
+    same_depths: float
+    beaten: float
     passed: bool
 
 
 class ModelContacts:
-    """The model's contacts in all poses of a scene, and the poses of all volumes.
+    """The model's contacts in all poses of a scene, and the poses of all volumes; len() returns the number of contacts.
 
-    `contacts`: for each pose, a dict from pairs of indices in `volumes` to depth [m] and normal (3,).  `volumes`: the robot's shapes, then
-    the world's objects.  The length is the number of contacts.
+    `contacts`: for each pose, a dict from pairs of indices in `volumes` to depth [m] and normal (3,), root frame.  `volumes`: the robot's
+    shapes, then the world's objects.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -91,7 +92,11 @@ class ModelContacts:
         return separation(first, at, second, there, direction)
 
     def depth_error(self) -> float:
-        """Return the largest difference [m] between the depth of a contact and the separation of its volumes along its normal."""
+        """Return the largest error [m] of the model's depths, over all contacts in all poses; 0 if there is no contact.
+
+        The error of a depth is its absolute difference from the distance that the first volume must move along the contact's normal to
+        leave the second one, as the method `separation` computes it.
+        """
         return max(
             (
                 abs(self.separation(at, pair, normal) - depth)
@@ -124,8 +129,9 @@ def agreements(scene: Scene, with_coal: bool) -> tuple[list[Agreement], float]:
 def compared(peer: str, scene: Scene, ours: ModelContacts, detect: Detect) -> Agreement:
     """Compare the contacts `ours` of the model with those of the peer.
 
-    `detect`: takes the index of a pose; returns the peer's pairs (c, 2), depths (c,) m, and directions (c, 3) that move the first volume
-    out.
+    `detect`: function that takes the index of a pose and returns the peer's contacts: pairs (c, 2) of indices in `ours.volumes`, depths
+    (c,) m, and unit vectors (c, 3), root frame, along which the first volume moves out of the second.  Depths that the peer does not
+    compute are not compared.
     """
     other: list[float] = []
     differences: dict[str, list[float]] = defaultdict(list)

@@ -76,7 +76,7 @@ def _on_large_arrays(count: int) -> float:
 
 
 def speed(loops: int = 3) -> float:
-    """Return the present speed of this machine in multiples of the standard machine's speed.
+    """Return the present speed of this machine in multiples of the speed of the standard machine (STANDARD_SECONDS, 0.01 s).
 
     It is STANDARD_SECONDS over the median processor time of `loops` calibration loops.
     """
@@ -101,7 +101,8 @@ class Calibration:
     def around(self, run: Callable[[], T]) -> tuple[T, float]:
         """Return the result of `run`, and the mean of the machine's speeds before and after it.
 
-        A time in seconds multiplied by this speed is the time on the standard machine.
+        The speeds are in multiples of that of the standard machine, the one for which the requirements were set.  A time in seconds
+        multiplied by this speed is the time on the standard machine.
         """
         before = self._present_speed()
         result = run()
@@ -109,7 +110,10 @@ class Calibration:
 
     @property
     def median(self) -> float:
-        """The median of all speeds measured so far, in multiples of the standard machine's speed."""
+        """The median of all speeds measured so far, in multiples of the standard machine's speed.
+
+        The standard machine is the one for which the requirements were set.
+        """
         return float(np.median(self.speeds))
 
     def _present_speed(self) -> float:
@@ -142,15 +146,17 @@ class Crew:
     def loops(self, count: int = 3) -> float:
         """Return the speed of this machine while all helpers do the calibration loop at the same time.
 
-        It is in multiples of the standard machine's speed: STANDARD_SECONDS over the median wall time of `count` measurements.
+        It is in multiples of the speed of the standard machine, the one for which the requirements were set: STANDARD_SECONDS (0.01 s) over
+        the median wall time of `count` measurements.
         """
         return STANDARD_SECONDS / self._request(_LOOP, 1, count)
 
     def exchanges(self, count: int = 5) -> float:
         """Return the speed of this machine while processes exchange messages, in multiples of the standard machine's speed.
 
-        All helpers do a portion of the loop for each message and answer; the next message is sent after all answers.  The speed is
-        STANDARD_EXCHANGE_SECONDS over the median wall time of a loop, of `count` measurements.
+        The standard machine is the one for which the requirements were set.  All helpers do a portion of the loop for each message and
+        answer; the next message is sent after all answers.  The speed is STANDARD_EXCHANGE_SECONDS (0.016 s) over the median wall time of a
+        loop, of `count` measurements.
         """
         return STANDARD_EXCHANGE_SECONDS / self._request(_PORTION, PORTIONS, count)
 

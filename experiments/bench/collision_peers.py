@@ -40,10 +40,7 @@ class _FclScene:
 
 
 class FclPairs(_FclScene):
-    """Collision detection by python-fcl that tests every pair of volumes, one after the other.
-
-    The length is the number of tested pairs.
-    """
+    """Collision detection by python-fcl that tests every pair of volumes, one after the other; len() returns the number of tested pairs."""
 
     def __init__(self, robot: Robot, snapshot: Snapshot) -> None:
         super().__init__(robot, snapshot)

@@ -46,15 +46,16 @@ PLAN_STYLES = {  # colour, line
 
 @dataclass(frozen=True, slots=True)
 class CostFigure:
-    """How one figure is made.
+    """The functions that measure and draw one figure of costs, and its layout.
 
-    `measure(quick, rounds)`: measures and returns the curves, {curve: {size: {name: cost}}}.  `draw(left, right, curves)`: draws them on
-    two Matplotlib axes.  `height`: of the figure, inches.  `share_y`: whether both axes have the same y axis.
+    `measure`: function of `quick` and `rounds` that measures and returns the curves, {curve: {size: {name: cost}}}.  `draw`: function that
+    draws the curves on two Matplotlib axes, left and right.  `height`: height of the figure, inches.  `share_y`: whether both axes have the
+    same y axis.
     """
 
     measure: Callable[..., Curves]
     draw: Callable[[Any, Any, Curves], None]
-    height: float  # inches
+    height: float
     share_y: bool
 
     def write(self, path: Path, quick: bool, rounds: int | None = None) -> Curves:
@@ -128,10 +129,10 @@ def _counts_axis(axes: Any, counts: tuple[int, ...]) -> None:
 
 
 def plant_costs(quick: bool, rounds: int | None = None) -> Curves:
-    """Measure the processor time of a plant with one arm, for several ticks [s] and numbers of objects.
+    """Measure the processor time of a plant with one arm, for several lengths of the tick [s] and numbers of objects.
 
-    Returns {"tick" or "objects": {size: {"us_per_tick": ..., "ms_per_second": ...}}}, the second per second of the plant's time.  `rounds`
-    is not used.
+    Returns {"tick" or "objects": {size: {"us_per_tick": ..., "ms_per_second": ...}}}: processor time of a tick [us], and processor time for
+    one second of the plant's time [ms].  `quick`: fewer actions.  `rounds` is not used.
     """
     curves: Curves = {"tick": {}, "objects": {}}
     points: list[tuple[str, float]] = [("tick", dt) for dt in TICKS]

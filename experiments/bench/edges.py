@@ -47,15 +47,20 @@ QUICK = Settings(spacing=0.02, rounds=1)
 
 
 def palm_map(spacing: float) -> Roadmap:
-    """Build the pre-grasp roadmap with this spacing [m].  Each vertex has edges to its 8 nearest; postures may be at the motors' limits."""
+    """Build the pre-grasp roadmap, whose vertices are poses of the robot with the palm beside possible places of a cup.
+
+    `spacing`: distance between vertices [m].  Each vertex has edges to its 8 nearest; postures may be at the motors' limits.
+    """
     return build(replace(pregrasp(), spacing=spacing, margin=0.0), "least_squares", neighbours=NEIGHBOURS)
 
 
 def measure(settings: Settings) -> dict[str, Any]:
     """Run this benchmark and return its result.
 
-    Keys: "vertices" and "edges", their numbers; for each method the processor time [s] and the number of poses, medians of the rounds;
-    "requirements" and "passed", as of `verdicts.verdict`.
+    Main keys: "vertices" and "edges", numbers of the roadmap; processor times [s] of the methods, medians of the rounds: "plain_s" (pose by
+    pose), "both_s" and "once_s" (each edge in both directions, or once), "change_s" and "all_s" (after an object was added, only the edges
+    near it, or all); "plain_poses", "both_poses" and "once_poses", numbers of checked poses; "agree", whether all methods find the same
+    free edges; "requirements", the list of judged requirements, each a dict; "passed", whether all are met and the methods agree.
     """
     with one_core() as core, Progress() as progress:
         progress.show(0.0, "making the map")

@@ -48,18 +48,19 @@ _ALONE = 1.0  # s between two faults, so that their effects can be distinguished
 class Settings:
     """Settings of the benchmark.
 
-    `schedules`: number of schedules.  `seed`: number of the first one.  `seconds`: duration of each [s].  `period`: mean time between two
-    faults [s].  `shrink`: maximum number of performances to shorten a schedule that breaks a guarantee.  `scenario`: of the system.
-    `quiet`: time without faults [s] before the first schedule, whose transitions are compared with those under faults; 0: no comparison.
+    `schedules`: number of schedules of faults.  `seed`: seed of the first schedule; each next one has the next seed.  `seconds`: duration
+    of each schedule [s].  `period`: mean time between two faults [s].  `shrink`: maximum number of times that a schedule which breaks a
+    guarantee is performed to shorten it; 0: it is not shortened.  `scenario`: scenario of the system.  `quiet`: time without faults [s]
+    before the first schedule, whose transitions are compared with those under faults; 0: no comparison.
     """
 
     schedules: int = 20
     seed: int = 1
     seconds: float = 10.0
     period: float = 4.0
-    shrink: int = 0  # performances to shrink a schedule that breaks a promise
+    shrink: int = 0
     scenario: str = "kinematic"
-    quiet: float = 0.0  # s without faults before the first schedule, whose transitions are compared
+    quiet: float = 0.0
 
 
 QUICK = Settings(schedules=2)
@@ -146,9 +147,11 @@ def _alone(schedule: Sequence[Fault], times: Sequence[float]) -> Iterator[tuple[
 def measure(settings: Settings) -> dict[str, Any]:
     """Perform the schedules on one system and return the result; raises LaunchFailed.
 
-    Main keys: "hold_ms", times until parts hold, by kind of fault; "back_s", times until all parts follow commands again [s];
-    "transitions", numbers of kept and lost ones; "broken", the broken guarantees as text; "rows", the measurements of each schedule;
-    "passed".
+    Main keys: "hold_ms", by kind of fault the times from a fault until a part holds its position [ms], and "back_s", the times from the end
+    of a schedule's last fault until all parts follow commands again [s], both as "count", percentiles "p50" and "p95", and "max";
+    "transitions", numbers of kept, lost and differing ones on disk; "broken", list of the broken guarantees as text; "rows", the
+    measurements of each schedule; "passed", whether no guarantee is broken, no transition is lost, and the times are short enough.  If the
+    machine was busy, times do not count.
     """
     rows: list[dict[str, Any]] = []
     with Progress() as progress, tempfile.TemporaryDirectory() as scratch, running(Path(scratch), settings.scenario) as system:

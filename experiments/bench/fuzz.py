@@ -55,8 +55,10 @@ QUICK = Settings(messages=40_000)
 def measure(settings: Settings) -> dict[str, Any]:
     """Send all messages and return the result; raises LaunchFailed.
 
-    Main keys: "sent", numbers by kind; "refused", "grown_mb" and "largest_growth_mb", by process; "ended", the processes that ended;
-    "learned", the agents that learned again afterwards; "passed".
+    Main keys: "sent", numbers of sent "messages", "calls" and "tokens"; "refused", number of refused messages by process; "grown_mb" and
+    "largest_growth_mb", growth of memory at the end and at most [MB], by process; "ended", list of the processes that ended; "learned",
+    list of the agents that made a transition afterwards; "passed", whether no process ended, no memory grew too much, and all agents
+    learned.
     """
     sent: Counter[str] = Counter()
     begun = time.monotonic()

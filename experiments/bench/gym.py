@@ -71,8 +71,8 @@ class Player:
 def players(steps: int) -> dict[str, Player]:
     """Return a player for each environment, by the name of the environment (the keys of UNITS).
 
-    `steps`: of each player in a run; the batch of Reach-v0 makes four times as many.  Raises NotInstalled without Gymnasium, MuJoCo or
-    imageio.
+    `steps`: number of steps of each player in a run; the batch of Reach-v0 makes four times as many.  Raises NotInstalled without
+    Gymnasium, MuJoCo or imageio.
     """
     gymnasium = import_peer("gymnasium", "Gymnasium")
     for package, name in (("mujoco", "MuJoCo"), ("imageio", "imageio, which Gymnasium's MuJoCo environments import")):
@@ -92,8 +92,9 @@ def players(steps: int) -> dict[str, Player]:
 def measure(settings: Settings) -> dict[str, Any]:
     """Run this benchmark and return its result; raises NotInstalled without Gymnasium, MuJoCo or imageio.
 
-    Main keys: "steps_per_second" and "standard" (the same on the standard machine), medians by environment; "times_humanoid" and
-    "times_reacher", rate of the batch of Reach-v0 over that of the peer; "requirements" and "passed".
+    Main keys: "steps_per_second", and "standard" for the same rates on the standard machine (the one for which the requirements were set),
+    both medians by environment; "times_humanoid" and "times_reacher", rate of the batch of Reach-v0 over that of the peer; "requirements",
+    the list of judged requirements, each a dict; "passed", whether all are met.
     """
     playing, speeds = players(settings.steps), Calibration()
     found: dict[str, list[float]] = {name: [] for name in playing}

@@ -70,8 +70,8 @@ QUICK = Settings(targets=20, whole=5, rivals=5)
 def measure(settings: Settings) -> dict[str, Any]:
     """Run this benchmark and return its result; raises NotInstalled without cma, mink or MuJoCo.
 
-    Main keys: "rows", the result of `Tries.row` by solver, with "times_cma" (time of CMA-ES over that of the solver); "requirements" and
-    "passed".
+    Main keys: "rows", by solver its statistics as `Tries.row` returns them, with "times_cma", the time of CMA-ES over that of the solver;
+    "requirements", the list of judged requirements, each a dict; "passed", whether all are met.
     """
     load_cma()
     load_mink()
@@ -210,8 +210,8 @@ def timed(solve: Solve, aim: Target, seed: int) -> tuple[bool, int, float]:
 class Tries:
     """What a solver needed for each of its targets, in order, whether it found a pose or not.
 
-    `reached`: whether it found one.  `evaluations`: number of evaluated poses.  `ms`: processor time [ms].  `standard_ms`: the same on the
-    standard machine.
+    `reached`: whether it found a pose.  `evaluations`: number of evaluated poses.  `ms`: processor time [ms].  `standard_ms`: the same on
+    the standard machine (the one for which the requirements were set).
     """
 
     reached: list[bool] = field(default_factory=list)

@@ -39,7 +39,10 @@ class Settings:
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """Run the system at each rate and return the result; raises LaunchFailed.  Keys: "runs", those of `judged_run`, and "passed"."""
+    """Run the system at each rate and return the result; raises LaunchFailed.
+
+    Main keys: "runs", list of the numbers of each run, as `judged_run` returns them; "passed", whether all runs passed.
+    """
     runs = []
     with Progress() as progress:
         for done, rate in enumerate(settings.rates):
@@ -53,11 +56,14 @@ def measure(settings: Settings) -> dict[str, Any]:
 
 
 def judged_run(rate: int, summary: Mapping[str, Any], bare_p99: float) -> dict[str, Any]:
-    """Return the numbers of one run and whether its ages are small enough.
+    """Return the numbers of one run and whether the ages of the commands are small enough.
 
-    `rate`: [Hz].  `summary`: the summary of the run.  `bare_p99`: 99th percentile [ticks] of the ages of the bare chain around the run.
-    Main keys: "age_p50", "age_p99" and "age_max" [ticks]; "jitter_ms_p50" and "jitter_ms_p99"; "at_most", the largest allowed "age_p99"
-    (None above 1 kHz); "passed".
+    The age of a command is the number of ticks from the tick that it answers to the tick in which the robot obeys it.  `rate`: rate of the
+    control loop [Hz].  `summary`: the summary of the run.  `bare_p99`: 99th percentile of the ages [ticks] of a chain of processes that do
+    nothing but fixed work (`calibration.bare_ages`), measured before and after the run.
+
+    Main keys: "age_p50", "age_p99" and "age_max", ages [ticks]; "jitter_ms_p50" and "jitter_ms_p99", jitter of the controller's period
+    [ms]; "at_most", the largest allowed "age_p99", None above 1 kHz; "passed", whether "age_p99" is at most this.
     """
     age, controller = summary["command_age_ticks"], summary["services"]["controller"]
     most = next((ticks * max(1.0, bare_p99 / BARE_AGE[limit]) for limit, ticks in MAX_AGE.items() if rate <= limit), None)

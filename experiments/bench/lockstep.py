@@ -22,7 +22,8 @@ from experiments.kit.live.launch import summary_of
 class Case:
     """A robot and a rate that are measured in one run.
 
-    `least`: required speed, and `aim`: desired speed, in multiples of real time on the standard machine; None: no bound.
+    `least`: required speed, and `aim`: desired speed, in multiples of real time on the standard machine, the one for which the requirements
+    were set; None: no bound.
     """
 
     backend: str
@@ -53,7 +54,9 @@ class Settings:
 def measure(settings: Settings) -> dict[str, Any]:
     """Run the system in each case and return the result; raises LaunchFailed.
 
-    Keys: "seconds"; "speed", the speed of this machine; "runs", the results of `judged_run`; "passed".
+    Keys: "seconds", duration of each run [s]; "speed", speed of this machine in multiples of that of the standard machine (the one for
+    which the requirements were set); "runs", list of the numbers of each run, as `judged_run` returns them; "passed", whether all runs
+    passed.
     """
     runs = []
     with Progress() as progress, Crew(HELPERS) as crew:
@@ -73,9 +76,9 @@ def _run(case: Case, seconds: float) -> dict[str, Any]:
 def judged_run(case: Case, summary: Mapping[str, Any], speed: float) -> dict[str, Any]:
     """Return the numbers of one run and whether it is fast enough and repeatable.
 
-    `summary`: the summary of the run.  `speed`: speed of this machine in multiples of the standard machine's.  Main keys: "speed", in
-    multiples of real time; "standard_speed", the same on the standard machine; "repeatable", whether the summary says that the run can be
-    repeated exactly; "passed".
+    `summary`: the summary of the run.  `speed`: speed of this machine in multiples of that of the standard machine (the one for which the
+    requirements were set).  Main keys: "speed", in multiples of real time; "standard_speed", the same on the standard machine;
+    "repeatable", whether the summary says that the run can be repeated exactly; "passed".
     """
     lockstep, agents = summary["lockstep"], summary["agents"]
     standard = lockstep["speed"] / speed

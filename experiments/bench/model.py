@@ -93,9 +93,11 @@ REQUIREMENTS = (
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """Run this benchmark and return the result of `summarized`, together with the workload and the versions of all programs.
+    """Run this benchmark and return its result; raises NotInstalled without MuJoCo or python-fcl.
 
-    Raises NotInstalled without MuJoCo or python-fcl.
+    Main keys: "workload" and "versions" (of all programs); "poses_per_second", "times_mujoco" and "times_python_fcl", rates of the iCub's
+    model and their ratios to the peers' rates; "agreement", the comparisons of contacts; "requirements" and "passed".  `summarized`
+    explains the last ones.
     """
     load_mujoco()
     robot, with_coal = upper_body(), importlib.util.find_spec("pinocchio") is not None
@@ -133,11 +135,13 @@ def summarized(
 ) -> dict[str, Any]:
     """Return the medians of the rates and of their ratios to the peers' rates, and the verdict.
 
-    `measured`: the rates by robot and number of objects.  `threads`: the gains of two threads and of two processes.  `depth_error`: the
-    model's largest depth error [m].  `compared`: the comparisons of contacts with the peers.
+    `measured`: the rates by robot and number of objects.  `threads`: "gain", wall time of a batch on one thread over that on two, and
+    "processes", how many times as much fixed work two processes do as one; None if they were not measured.  `depth_error`: the model's
+    largest depth error [m].  `compared`: the comparisons of contacts with the peers.
 
-    Keys: "poses_per_second", "times_mujoco" and "times_python_fcl", each by number of objects and contestant, for the iCub; "others", the
-    same tables for each other robot; "requirements" and "passed"; and the last three arguments.
+    Keys: "poses_per_second", "times_mujoco" and "times_python_fcl", each a number by number of objects and contestant, for the iCub;
+    "others", the same tables for each other robot; "requirements", the list of judged requirements, each a dict; "passed", whether all are
+    met and all comparisons have passed; "threads", "depth_error", and "agreement", the last three arguments.
     """
 
     def tables(found: Mapping[int, Rates]) -> dict[str, Any]:

@@ -50,8 +50,9 @@ QUICK = Settings(dimensions=(10,), runs=3)
 def measure(settings: Settings) -> dict[str, Any]:
     """Run this benchmark and return its result; raises NotInstalled without cma.
 
-    Main keys: "rows", one for each function and dimension, with the median evaluations of each strategy and the "ratio" of NES to CMA-ES;
-    "ratio", the median of these ratios; "requirements" and "passed".
+    Main keys: "rows", a dict for each function and dimension, with the median evaluations of each strategy and the "ratio" of NES to
+    CMA-ES; "ratio", the median of these ratios; "requirements", the list of judged requirements, each a dict; "passed", whether all are
+    met.
     """
     load_cma()
     rows = [(name, d) for d in settings.dimensions for name in FUNCTIONS]
@@ -79,8 +80,8 @@ def _row(name: str, d: int, runs: int) -> dict[str, Any]:
 def search(strategy: str, function: str, d: int, seed: int, most: int = MAX_EVALUATIONS) -> tuple[float, float]:
     """Search for the minimum of a rotated function with one strategy.
 
-    `strategy`: a key of STRATEGIES.  `function`: a key of FUNCTIONS.  `d`: number of dimensions.  `seed`: of rotation, start and strategy.
-    `most`: maximum number of evaluations.
+    `strategy`: a key of STRATEGIES.  `function`: a key of FUNCTIONS.  `d`: number of dimensions.  `seed`: seed of rotation, start and
+    strategy. `most`: maximum number of evaluations.
 
     Returns the number of evaluations until a sample costs less than TARGET (1e-8), or inf if `most` do not suffice; and the strategy's own
     processor time per evaluation [us], without the time of the function.

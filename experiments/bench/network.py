@@ -83,7 +83,7 @@ class Settings:
     """Settings of the benchmark.
 
     `layouts`: keys of LAYOUTS, which say what runs on the second host.  `faults`: names of disturbances in FAULTS.  `seconds`: duration of
-    each disturbance [s].  `rounds`: how often each is repeated.  `seed`: of the delayed, lost and reordered packets.
+    each disturbance [s].  `rounds`: how often each is repeated.  `seed`: seed of the delayed, lost and reordered packets.
     """
 
     layouts: tuple[str, ...] = tuple(LAYOUTS)
@@ -99,9 +99,10 @@ QUICK = Settings(faults=("loss 5 %", "cut", "silent cut"), seconds=3.0)
 def measure(settings: Settings) -> dict[str, Any]:
     """Disturb the network of a system on two hosts and return the result; raises LaunchFailed.
 
-    Main keys: "oldest_ms", age of the oldest command that was obeyed [ms]; "back_s", longest time until all parts moved again [s];
-    "transitions", numbers of kept and lost ones; "broken", the broken guarantees as text; "rows", the measurements of each disturbance;
-    "passed".
+    Main keys: "oldest_ms", age of the oldest command that was obeyed [ms]; "back_s", longest time from the end of a disturbance until all
+    parts moved again [s]; "transitions", dict with the numbers of kept, lost and differing ones on disk; "broken", list of the broken
+    guarantees as text; "rows", the measurements of each disturbance; "passed", whether no guarantee is broken, no transition is lost, and
+    "back_s" is small enough.  If the machine was busy, times do not count.
     """
     argv = [sys.executable, "-m", "mobee_system.run", "experiments.bench.network", msgspec.json.encode(asdict(settings)).decode()]
     done = subprocess.run(inside(argv), stdout=subprocess.PIPE, text=True)

@@ -101,11 +101,14 @@ class DecisionProblem:
     """A decision problem in the form that SciPy and quantecon need: a sparse matrix with a row for each state-action.
 
     It is built before the timing begins.  Every state must have at least one action.  `rewards` (N,) and `following` (N, S) are the rewards
-    and the transition probabilities of all N state-actions. quantecon's policy iteration, which is exact, is not measured: it does not end
+    and the transition probabilities of all N state-actions.  quantecon's policy iteration, which is exact, is not measured: it does not end
     if the values of two actions differ only by rounding errors.
 
     Args:
-        model, reward, discount, tolerance: as of `mobee.value_iteration`.
+        model: transition model with S states.
+        reward: (S, A), reward of each action; -inf where there is no action.
+        discount: discount factor, 0 to 1.
+        tolerance: largest change of an action's value in the last sweep of value iteration.
     """
 
     def __init__(self, model: OutcomeModel, reward: Array, discount: float, tolerance: float) -> None:

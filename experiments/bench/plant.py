@@ -46,17 +46,18 @@ REQUIREMENTS = (
 class Settings:
     """Sizes and repetitions of the runs.
 
-    `actions`, `reaches` and `transitions`: of one run of each kind.  `hashed`: actions of the trajectory whose hash is computed twice.
-    `ticks`: of MuJoCo.  `batched`: actions of each plant of a batch.  `rounds`: repetitions; the median counts.
+    `actions`, `reaches` and `transitions`: number in one run of each kind.  `hashed`: number of actions of the trajectory whose hash is
+    computed twice.  `ticks`: number of control ticks for which MuJoCo's steps are timed.  `batched`: number of actions of each plant of a
+    batch.  `rounds`: repetitions; the median counts.
     """
 
     actions: int = 1000
     reaches: int = 500
     transitions: int = 3000
-    hashed: int = 50  # actions of the trajectory whose hash is computed twice
-    ticks: int = 5000  # of MuJoCo
-    batched: int = 20  # actions of each plant of a batch
-    rounds: int = 3  # the median counts
+    hashed: int = 50
+    ticks: int = 5000
+    batched: int = 20
+    rounds: int = 3
 
 
 QUICK = Settings(actions=100, reaches=50, transitions=300, hashed=10, ticks=500, batched=2, rounds=1)
@@ -65,8 +66,10 @@ QUICK = Settings(actions=100, reaches=50, transitions=300, hashed=10, ticks=500,
 def measure(settings: Settings) -> dict[str, Any]:
     """Run this benchmark and return its result; raises NotInstalled without MuJoCo.
 
-    Main keys: "one_arm", "reaching" and "three_agents", medians of the rates (`Pace`); "mujoco_us_per_tick" and "times_mujoco" (MuJoCo's
-    time over ours); "batch", the result of `measure_batch`; "requirements", "same_hash" and "passed".
+    Main keys: "one_arm", "reaching" and "three_agents", each a dict with the median rates of `Pace.numbers` and `Pace.standard`;
+    "mujoco_us_per_tick", and "times_mujoco", MuJoCo's time over ours; "batch", the result of `measure_batch`; "requirements", the list of
+    judged requirements, each a dict; "same_hash", whether two equal runs made the same trajectory; "passed", whether all requirements are
+    met and the hashes are equal.
     """
     load_mujoco()
     runs: dict[str, Callable[[], Pace]] = {
@@ -117,19 +120,23 @@ def report(result: dict[str, Any]) -> str:
 class Pace:
     """Times and counts of one run.
 
-    `seconds`: processor time of this process [s].  `plant_seconds`: simulated time of all plants [s].  `ticks`: of all plants.  `ended`:
-    actions, reaches or transitions that ended.  `wall_seconds`: [s].
+    `seconds`: processor time of this process [s].  `plant_seconds`: simulated time of all plants [s].  `ticks`: number of ticks of all
+    plants.  `ended`: number of actions, reaches or transitions that ended.  `wall_seconds`: wall time of the run [s].
     """
 
-    seconds: float  # processor time of this process
-    plant_seconds: float  # of all plants
+    seconds: float
+    plant_seconds: float
     ticks: int
-    ended: int  # actions or transitions
+    ended: int
     wall_seconds: float = float("nan")
 
     @property
     def numbers(self) -> dict[str, float]:
-        """The rates of the run, by their names in the JSON result; they are computed from the processor time."""
+        """The rates of the run, by their names in the JSON result; they are computed from the processor time.
+
+        Keys: "times_real_time", simulated over processor time; "actions_per_second"; "us_per_tick", processor time of a tick [us];
+        "seconds_per_action", simulated time of an action [s].
+        """
         return {
             "times_real_time": self.plant_seconds / self.seconds,
             "actions_per_second": self.ended / self.seconds,
@@ -138,7 +145,7 @@ class Pace:
         }
 
     def standard(self, speed: float) -> dict[str, float]:
-        """Return two of the rates as they are on the standard machine.
+        """Return two of the rates as they are on the standard machine, the one for which the requirements were set.
 
         `speed`: the speed of this machine during the run, in multiples of the standard machine's (calibration.py).  Keys:
         "standard_times_real_time" and "standard_actions_per_second".
@@ -269,7 +276,7 @@ class Batch:
 def measure_batch(actions: int, rounds: int) -> dict[str, Any]:
     """Compare a batch of plants with one plant alone, and two threads with one thread, in the same rounds.
 
-    `actions`: of each plant of the batch in a round; the plant alone makes as many as the whole batch.
+    `actions`: number of actions of each plant of the batch in a round; the plant alone makes as many as the whole batch.
 
     Keys: "plants", their number; "alone" and "together", each with "us_per_tick" and "ticks_per_second"; "ratio", ticks per second of the
     batch over the plant alone; "two_threads", ticks per second of wall time on two threads over one, or None on one core.  All are medians

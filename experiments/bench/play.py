@@ -64,8 +64,9 @@ QUICK = Settings(rounds=1)
 def measure(settings: Settings) -> dict[str, Any]:
     """Run this benchmark and return its result; raises NotInstalled without Chromium or Playwright, and LaunchFailed.
 
-    Main keys: "starts", the measurements of each start; "slowest_standard_s", time of the slowest robot on the standard machine [s];
-    "ends_clean", whether every system ended without error and left no process; "requirements" and "passed".
+    Main keys: "starts", list of the measurements of each start; "slowest_standard_s", time of the slowest robot [s] as it is on the
+    standard machine (the one for which the requirements were set); "ends_clean", whether every system ended without error and left no
+    process; "requirements", the list of judged requirements, each a dict; "passed", whether all are met and the ends were clean.
     """
     chromium = find_chromium()
     if chromium is None:

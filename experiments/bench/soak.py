@@ -82,9 +82,10 @@ class _Sample:
 def measure(settings: Settings) -> dict[str, Any]:
     """Run the system, read the status of its processes regularly, and return the result; raises LaunchFailed.
 
-    Main keys: "processes", by process the growth of memory [MB], open files and threads; "slower", time of a tick at the end over that at
-    the beginning; "ages" and "apart", ages of commands [ticks] and the difference of their distributions; "restarted", processes that were
-    started again; "passed".
+    Main keys: "processes", by process a dict with the growth of memory [MB] and the additional open files and threads; "slower", time of a
+    tick at the end over that at the beginning; "ages", ages of commands [ticks], "first" at the beginning and "last" at the end, and
+    "apart", the difference of both distributions; "restarted", list of the processes that were started again; "passed", whether nothing
+    grew, slowed down or restarted.
     """
     ticks, end, samples = _Ticks(), settings.hours * 3600.0, list[_Sample]()
     with Progress() as progress, tempfile.TemporaryDirectory() as scratch, running(Path(scratch), settings.scenario) as system:

@@ -60,7 +60,12 @@ QUICK = Settings(rounds=5, systems=1)
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """Run this benchmark and return the result of `summarized`; raises LaunchFailed."""
+    """Run this benchmark and return its result; raises LaunchFailed.
+
+    Keys: "wall_s" and "processor_s", median times [s] by program; "times_numpy", processor time over that of importing NumPy; "system",
+    times until the system is ready [s] and memory [MB]; "requirements", the list of judged requirements, each a dict; "passed", whether all
+    are met.
+    """
     rounds: list[dict[str, tuple[float, float]]] = []
     systems: list[dict[str, Any]] = []
     with Progress() as progress:
@@ -78,10 +83,12 @@ def measure(settings: Settings) -> dict[str, Any]:
 def summarized(rounds: list[dict[str, tuple[float, float]]], systems: list[dict[str, Any]]) -> dict[str, Any]:
     """Return the medians of all measurements and the verdict.
 
-    `rounds`: wall and processor time [s] of each program, for each round.  `systems`: the measurements of each start of the system.
+    `rounds`: for each round a dict from a program's name to its wall and processor time [s].  `systems`: the measurements of each start of
+    the system.
 
-    Keys: "wall_s" and "processor_s", by program; "times_numpy", processor time over that of importing NumPy; "system", times until it is
-    ready [s] and memory [MB]; "requirements" and "passed".
+    Keys: "wall_s" and "processor_s", median times [s] by program; "times_numpy", processor time over that of importing NumPy; "system", a
+    dict with the times until it is ready [s] and memory [MB]; "requirements", the list of judged requirements, each a dict; "passed",
+    whether all are met.
     """
     wall, own = ({name: np.array([one[name][which] for one in rounds]) for name in _PROGRAMS} for which in (0, 1))
     ratios = {name: float(np.median(own[name] / own[NUMPY])) for name in (IMPORT, POSE)}

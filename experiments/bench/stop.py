@@ -49,7 +49,8 @@ _ARMED = 3.0  # s after a release in which the robot should move again
 class Settings:
     """Settings of the benchmark.
 
-    `floods`: names of the floods; "nothing" for none.  `stops`: number of stops under each flood, by the record, and again by the bus.
+    `floods`: names of the floods of messages under which the robot is stopped; "nothing" for none.  `stops`: number of stops under each
+    flood that are requested in the record of emergency stops, a file, and again the same number by a message on the bus.
     """
 
     floods: Sequence[str] = (NOTHING, *FLOODS)
@@ -75,8 +76,10 @@ class _Gate:
 def measure(settings: Settings) -> dict[str, Any]:
     """Stop the robot under each flood and return the result; raises LaunchFailed.
 
-    Main keys: "floods", for each one medians and 99th percentiles [ms] of the times by the record ("stop_ms"), by the bus ("bus_stop_ms")
-    and to connect; "late" and "late_by_bus", the floods with a 99th percentile above 50 ms; "passed".
+    Main keys: "floods", list with a dict for each flood: medians and 99th percentiles (endings "_p50" and "_p99") of the times [ms] from a
+    stop in the record ("stop_ms") or on the bus ("bus_stop_ms") until the robot reports it, and of the time to connect a client
+    ("connect_ms"); "late" and "late_by_bus", lists of the floods with a 99th percentile above 50 ms by the record or by the bus; "passed",
+    whether no process ended and no flood is late by the record.  If the machine was busy, lateness does not count.
     """
     rows = []
     with Progress() as progress, tempfile.TemporaryDirectory() as scratch, running(Path(scratch), "kinematic") as system:

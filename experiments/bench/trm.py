@@ -62,8 +62,9 @@ QUICK = Settings(spacing=0.03, vertices=300)
 def measure(settings: Settings) -> dict[str, Any]:
     """Run this benchmark and return its result.
 
-    Main keys: "rows", by method: times, number of vertices, coverage and validity, each the worst of all seeds; "reachable", the number of
-    reachable points to compare with; "requirements" and "passed".
+    Main keys: "rows", for each method a dict with times, number of vertices, coverage and validity, each the worst of all seeds;
+    "reachable", number of reachable points with which coverage is computed; "requirements", the list of judged requirements, each a dict;
+    "passed", whether all are met.
     """
     example = replace(pregrasp(), margin=0.0)  # all that can be reached
     spacing = np.full(len(example.task.names), settings.spacing)

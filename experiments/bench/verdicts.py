@@ -20,7 +20,7 @@ class Requirement:
     """
 
     name: str
-    keys: tuple[str | int, ...]  # of the result, from the outermost
+    keys: tuple[str | int, ...]
     at_least: float | None = None
     at_most: float | None = None
     aim: float | None = None
@@ -53,8 +53,9 @@ class Requirement:
 def verdict(result: Mapping[str, Any], requirements: Iterable[Requirement], **conditions: bool) -> dict[str, Any]:
     """Return the verdict on a result, to be merged into the result.
 
-    Keys: "requirements", as of `Requirement.judge`; the named `conditions`; "passed": whether all requirements are met and all conditions
-    are true.
+    `conditions`: further conditions by name, each true or false.  Keys: "requirements", a list with the dict of each judged requirement, as
+    `Requirement.judge` returns it; the names of the `conditions`, with their values; "passed", whether all requirements are met and all
+    conditions are true.
     """
     judged = [one.judge(result) for one in requirements]
     return {"requirements": judged, **conditions, "passed": all(one["passed"] for one in judged) and all(conditions.values())}
@@ -71,8 +72,8 @@ def requirement_lines(requirements: Iterable[Mapping[str, Any]]) -> list[str]:
 def report_text(lines: Iterable[str], result: Mapping[str, Any], speed: float | None = None) -> str:
     """Return the text of a benchmark's report.
 
-    It has `lines`, then the speed of this machine if it was measured (in `result` or as `speed`, in multiples of the standard machine's),
-    then the requirements in `result`.
+    It has `lines`, then the speed of this machine if it was measured, then the requirements in `result`.  The speed is in `result`, or is
+    `speed`, in multiples of that of the standard machine, the one for which the requirements were set.
     """
     speed = result.get("speed", speed)
     calibration = [] if speed is None else [f"Calibration: {speed:.2f} x the standard machine's speed.  Required, in its time:"]

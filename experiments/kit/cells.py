@@ -50,7 +50,7 @@ Work = Callable[[Cell], dict[str, Any]]
 
 @dataclass(frozen=True)
 class CellResult:
-    """A finished cell, read from its file `path`; its values are read at the first access."""
+    """A finished cell, which is one run of a sweep.  It is read from its file `path`; its values are read at the first access."""
 
     cell: Cell
     seconds: float
@@ -72,7 +72,8 @@ _RECORD, _ARRAY = "record", "array."  # names in the archive: of the JSON text, 
 def write_cell(folder: Path, cell: Cell, values: dict[str, Any], seconds: float) -> None:
     """Write the values of a cell to `folder`/cells/<name>.npz; an interruption leaves no incomplete file of this name.
 
-    `values`: by name.  `seconds`: duration of the run.  Raises InvalidValue for a value that is neither JSON nor an array, and OSError.
+    `folder`: folder of the run.  `values`: dict from names to what the cell's run returned.  `seconds`: duration of the cell's run.  Raises
+    InvalidValue for a value that is neither JSON nor an array, and OSError.
     """
     arrays = {key: value for key, value in values.items() if isinstance(value, np.ndarray)}
     record = {"cell": asdict(cell), "seconds": seconds, "values": {key: value for key, value in values.items() if key not in arrays}}
@@ -90,7 +91,10 @@ def write_cell(folder: Path, cell: Cell, values: dict[str, Any], seconds: float)
 
 
 def cell_path(folder: Path, name: str) -> Path:
-    """Return the path of a finished cell; `folder`: of the run; `name`: of the cell."""
+    """Return the path of the file of a finished cell.
+
+    `folder`: folder of the run of the whole sweep.  `name`: name of the cell.
+    """
     return folder / FOLDER / f"{name}.npz"
 
 

@@ -77,9 +77,12 @@ def verdict_of(holds: Holds | Envelope, is_aim: bool = False, untested: bool = T
 def in_settings(what: str, rule: Rule, settings: Mapping[str, Any]) -> Measured | None:
     """Judge a claim by its rule in each of several settings; returns None if the rule returns None in all settings.
 
-    `what`: what differs between the settings, as "unit of distance".  `settings`: the runs in each setting, by its name.  The text has our
-    numbers in the first setting, and in each other setting with another outcome.  If the rule returns an Envelope, and the same one in all
-    settings, then this is the outcome; if the Envelopes differ, each pair of an outer and an inner setting counts as a setting.
+    `what`: what differs between the settings, as "unit of distance".  `settings`: the runs in each setting, by its name.
+
+    Returns a text and an outcome.  The text has our numbers in the first setting, and in each other setting whose outcome differs from that
+    of the first.  The outcome is an Envelope with the outcome of each setting; if only one setting has enough runs, it is that setting's
+    outcome.  If the rule itself returns an Envelope (outcomes in its own, inner settings), and the same one in all settings, this is the
+    outcome; if these Envelopes differ, the outcome is one Envelope in which each pair of a setting and an inner setting is an entry.
     """
     each = {name: found for name, runs in settings.items() if (found := rule(runs)) is not None}
     if not each:
@@ -172,7 +175,11 @@ def claim(source: str, text: str, published: str, varies: str = "", untested: st
 
 
 def judged(claims: Iterable[Claim], runs: Any, complete: bool = True) -> list[dict[str, Any]]:
-    """Return the claims as dicts, measured and judged by their rules from `runs`; if the runs are not `complete`, all stay unmeasured."""
+    """Return the claims as dicts, measured and judged by their rules from `runs`.
+
+    `complete`: whether the runs suffice.  If they do not, the rules are not called, and all claims keep their text without measured
+    numbers.
+    """
     return [(_by_rule(claim, runs) if complete else claim).record() for claim in claims]
 
 
@@ -211,7 +218,7 @@ class Method(Protocol):
     def recorded(self, folder: Path) -> AbstractContextManager[Path]:
         """Return a context manager that yields a folder with the files of a finished run that match `kept`, for its raw record.
 
-        `folder`: of the run.  The yielded folder is this one, or a temporary one with reduced values.
+        `folder`: folder of the run.  The yielded folder is `folder` itself, or a temporary folder in which the values are reduced.
         """
 
     def results(self, folder: Path) -> dict[str, Any]:
@@ -238,7 +245,7 @@ class Steps:
     summary: Callable[[dict[str, Any]], dict[str, Any]] | None = None
 
     def recorded(self, folder: Path) -> AbstractContextManager[Path]:
-        """Return a context manager that yields the folder of the run, or with a `summary` a temporary folder with the reduced cells."""
+        """Return a context manager that yields the run's folder, or, if there is a `summary`, a temporary folder with the reduced cells."""
         return nullcontext(folder) if self.summary is None else reduced_cells(folder, self.summary)
 
     def results(self, folder: Path) -> dict[str, Any]:
@@ -254,9 +261,10 @@ class Experiment:
 
     Attributes:
         claim: one line that states what the experiment tests.
-        source: where this was published.
+        source: the publication that states the claim.
         method: the functions that run the experiment and draw its figure.
-        claims: its rows in the table of claims; the measured ones are in the results, under "claims".
+        claims: the experiment's rows in the table of claims, without numbers; the results of a run contain them with numbers, under the key
+            "claims".
         repeats: name of the option with the number of repetitions of a run; with fewer than MIN_SEEDS (5) no claim is decided.
         name: name of the experiment on the command line, set by `experiments.registry`.
         notes: docstring of the module, with claim, source, published numbers and run time, set by `experiments.registry`.
@@ -271,13 +279,16 @@ class Experiment:
     notes: str = ""
 
     def repetitions(self, made: int | None) -> str:
-        """Return the number of repetitions of a run as text: "10 seeds", "1 seed", or "no seeds" for None."""
+        """Return a text such as "10 seeds" or "1 seed"; `made`: number of repetitions of a run, None or 0: the text is "no seeds".
+
+        The word is the name of the option in `repeats`.
+        """
         return f"{made or 'no'} {self.repeats.removesuffix('s') if made == 1 else self.repeats}"
 
     def decided(self, results: Mapping[str, Any], options: Mapping[str, Any]) -> dict[str, Any]:
         """Return the results of a run; with fewer than MIN_SEEDS (5) repetitions, all claims in them become open and keep their numbers.
 
-        `options`: of the run, by name.
+        `results`: the results as the experiment computed them; they are not changed.  `options`: the options of the run, by name.
         """
         made = options.get(self.repeats)
         if "claims" not in results or (made is not None and made >= MIN_SEEDS):

@@ -127,10 +127,12 @@ class PhysicsPlant:
         return self._reaches.outcome(part)
 
     def follow_path(self, path: Array, speed: float, watch: BumpWatch | None = None, forces: Forces | None = None) -> Followed:
-        """Move along a path (K, n) rad at a share `speed` of the largest speed, as in `mobee.behaviours.pick.Body.follow_path`.
+        """Move along a path, postures (K, n) rad, at a share `speed` of the largest speed, and return how the motion ended.
 
-        `watch`: detects bumps; after a bump the robot moves back a little and the motion ends; None: no detection.  `forces`: the law's
-        forces (n,) rad/s^2 at a posture (n,) rad, which the attractors balance; None: the attractors balance none.
+        `watch`: detects bumps; after a bump the robot moves back a little and the motion ends; None: bumps are not detected. `forces`:
+        function that takes a posture (n,) rad and returns the forces (n,) rad/s^2 of the control law except spring and damping.  The
+        attractor is shifted such that its spring cancels these forces; None: they are not cancelled.  The method implements
+        `mobee.behaviours.pick.Body.follow_path`.
         """
         wanted = timed(self.robot, np.clip(path, *self.robot.limits.T), self.controller.gains, speed)
         if watch is not None:

@@ -49,9 +49,9 @@ def finish(axes: Any, legend: float = 0.0, **settings: Any) -> None:
 
 
 def finish_normalised(axes: Any) -> None:
-    """Complete a plot of cumulative distributions of normalised squared errors in 3-D.
+    """Complete a plot of cumulative distributions of normalised squared errors in 3-D: add a reference curve, axis labels and a legend.
 
-    Adds the chi-squared distribution with 3 degrees of freedom, which the errors have if their covariance is correct, labels and a legend.
+    The curve is the chi-squared distribution with 3 degrees of freedom, which the errors have if their covariance is correct.
     """
     from scipy.special import chdtr
 
@@ -89,7 +89,7 @@ def draw_band(axes: Any, at: ArrayLike, groups: Sequence[ArrayLike], line: str, 
 def draw_bars(axes: Any, at: ArrayLike, groups: Sequence[Array], width: float, color: str, label: str) -> None:
     """Draw the interquartile mean of each group of runs as a bar, and its 95 % bootstrap interval as a whisker.
 
-    `at`: x value of each group.  `groups`: the numbers of the runs of each group.  `width`: of a bar, in units of the x axis.
+    `at`: x value of each group.  `groups`: the numbers of the runs of each group.  `width`: width of a bar, in units of the x axis.
     """
     means, low, high = _of(groups)
     spread = np.maximum([means - low, high - means], 0.0)  # an interval need not hold the mean

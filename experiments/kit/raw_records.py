@@ -30,7 +30,10 @@ class TooLarge(InvalidValue):
 
 
 def record_path(name: str, confirms: bool = False) -> Path:
-    """Return the path of the archive of an experiment; `confirms`: of the archive of its run with new seeds."""
+    """Return the path of the archive of an experiment.
+
+    `confirms`: return the archive of the run with new seeds, which confirms the first run, instead of that of the first run.
+    """
     return RECORDS / f"{name}{'-confirm' if confirms else ''}{_SUFFIX}"
 
 
@@ -108,7 +111,8 @@ def _unpacked(path: Path) -> bytes:
 def opened_record(name: str, confirms: bool = False) -> Iterator[Path]:
     """Extract the archive of an experiment into a temporary folder, which has the files of the run's folder, and yield this folder.
 
-    `confirms`: the archive of its run with new seeds.  Raises InvalidValue if there is no archive, or if it is damaged.
+    `confirms`: open the archive of the run with new seeds, which confirms the first run, instead of that of the first run.  Raises
+    InvalidValue if there is no archive, or if it is damaged.
     """
     path = record_path(name, confirms)
     if not path.exists():

@@ -75,7 +75,8 @@ class Row:
     def record(self) -> dict[str, object]:
         """Return the fields by name, as a record of the file or as the values of a cell.
 
-        Floats are rounded to PLACES decimals (None: not rounded); characters of texts that are not ASCII are written as escapes.
+        Floats are rounded to PLACES decimals, 6 unless a subclass sets another number (None: they are not rounded).  Characters of texts
+        that are not ASCII are written as escapes.
         """
         return {name: self._written(getattr(self, name)) for name in self.columns()}
 

@@ -143,10 +143,10 @@ def alone() -> Model:
 
 
 def carry(model: Model, name: str, shape: Geometry, marker: str, ahead: float, along: ArrayLike = FINGERS) -> None:
-    """Attach an object of role "ghost" to a hand in the world of `model`.
+    """Attach an object to a hand in the world of `model`; it has the role "ghost", so it exerts no force.
 
-    `name`, `shape`: of the object.  `marker`: of the palm.  `ahead`: distance of the object's centre from the palm, along the palm's
-    normal, m.  `along`: direction (3,) of the object's z axis in the palm's frame; by default that of the fingers.
+    `name`, `shape`: name and shape of the object.  `marker`: marker of the palm.  `ahead`: distance of the object's centre from the palm,
+    along the palm's normal, m.  `along`: direction (3,) of the object's z axis in the palm's frame; by default that of the fingers.
     """
     m = model.robot.marker(marker)
     z = m.rotation @ np.asarray(along, dtype=np.float64)

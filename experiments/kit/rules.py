@@ -121,18 +121,18 @@ def is_above(first: ArrayLike, second: ArrayLike) -> bool | None:
 
 
 def stands_above(values: Mapping[Key, ArrayLike], name: Key, least: float = -np.inf) -> bool | None:
-    """Return whether the interquartile mean of the group `name` is above those of all other groups, and above `least`; None: open.
+    """Return whether the interquartile mean of the group `name` is above those of all other groups, and above `least`.
 
-    `values`: the numbers of the runs of each group, by its key.
+    `values`: the numbers of the runs of each group, by its key.  None: the 95 % intervals do not decide it.
     """
     apart = [is_above(values[name], group) for key, group in values.items() if key != name]
     return all_hold([*apart, *([decides(interval(values[name]), least=least)] if least > -np.inf else [])])
 
 
 def stands_below(values: Mapping[Key, ArrayLike], name: Key) -> bool | None:
-    """Return whether the interquartile mean of the group `name` is below those of all other groups; None: open.
+    """Return whether the interquartile mean of the group `name` is below those of all other groups.
 
-    `values`: the numbers of the runs of each group, by its key.
+    `values`: the numbers of the runs of each group, by its key.  None: the 95 % intervals do not decide it.
     """
     return all_hold(is_above(group, values[name]) for key, group in values.items() if key != name)
 

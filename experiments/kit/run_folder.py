@@ -26,7 +26,7 @@ CONFIG, VERSIONS, RESULTS = "config.json", "versions.json", "results.json"
 def new_run(runs: Path, name: str, options: Mapping[str, Any]) -> Path:
     """Make the folder `runs`/<time>-<name> of a new run, with config.json and versions.json, and return it; raises OSError.
 
-    `name`: of the experiment.  `options`: of the run, by name.
+    `name`: name of the experiment.  `options`: options of the run, by name.
     """
     runs.mkdir(parents=True, exist_ok=True)
     stamp = time.strftime("%Y%m%d-%H%M%S")

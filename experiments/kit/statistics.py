@@ -52,7 +52,10 @@ def _deciding_at(level: float, samples: dict[tuple[object, ...], Array]) -> Iter
 
 
 def decision_level() -> float:
-    """Return the level of the intervals that decide: LEVEL (0.95), or within `error_rate` the level that it tries."""
+    """Return the confidence level of the intervals that decide claims: LEVEL (0.95), or the level that a call of `error_rate` tries now.
+
+    `error_rate` takes note that its decision has asked for this level.
+    """
     made = _decisions.get(_Decisions())
     made.used = True
     return made.level

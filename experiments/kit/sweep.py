@@ -122,7 +122,7 @@ class Sweep:
         return found if self.summary is None else {name: _summarised(one, self.summary) for name, one in found.items()}
 
     def recorded(self, folder: Path) -> AbstractContextManager[Path]:
-        """Return a context manager that yields the folder of the run, or with a `summary` a temporary folder with the reduced cells."""
+        """Return a context manager that yields the run's folder, or, if there is a `summary`, a temporary folder with the reduced cells."""
         return nullcontext(folder) if self.summary is None else reduced_cells(folder, partial(_reduced, self.summary))
 
     def figure(self, folder: Path) -> Path:

@@ -31,7 +31,10 @@ ARM = ("shoulder_1", "shoulder_2", "shoulder_3", "upper_arm", "elbow_1", "forear
 
 
 def always() -> list[list[str]]:
-    """Return the pairs of link names that are always listed: hands and forearms against torso, head, the other arm and the table."""
+    """Return the pairs of link names that count as solid contact in any case, without a test of poses.
+
+    They are hands and forearms against torso, head, the other arm and the table.
+    """
     pairs = set()
     for side, other in (("l", "r"), ("r", "l")):
         for link in (f"{side}_forearm", f"{side}_hand"):
@@ -41,7 +44,10 @@ def always() -> list[list[str]]:
 
 
 def legal_poses(robot: Robot, rng: np.random.Generator, count: int) -> list[Array]:
-    """Return `count` random poses (n,) rad, uniform within the limits, that satisfy every clause."""
+    """Return `count` random poses (n,) rad, uniform within the limits, that satisfy every clause.
+
+    A clause is a condition on several motor positions, as the shoulder's cables impose.
+    """
     lower, upper = robot.limits[:, 0], robot.limits[:, 1]
     poses: list[Array] = []
     while len(poses) < count:

@@ -145,9 +145,11 @@ def add_joint(parent: ET.Element, data: dict[str, Any], joint: dict[str, Any], p
 
 
 def skeleton_point(name: str, point: Array, axis: Array) -> Array:
-    """Return the point (3,) m on a joint's axis that is nearest to the anchor of its group in ANCHORS; without an anchor, `point` itself.
+    """Return the point (3,) m on a joint's axis through which the body's skeleton is drawn.
 
-    `name`: of the joint.  `point`, `axis`: (3,), a point and the direction of its axis, root frame at zero pose.
+    It is the point nearest to the anchor of the joint's group in ANCHORS, which are positions in m, root frame at zero pose; without an
+    anchor, it is `point` itself.  `name`: name of the joint.  `point`, `axis`: (3,), a point on the axis and the unit vector of its
+    direction, root frame at zero pose.
     """
     plain = name.removeprefix("l_").removeprefix("r_")
     key = next((key for key in (plain, plain.split("_")[0]) if key in ANCHORS), None)
@@ -158,7 +160,10 @@ def skeleton_point(name: str, point: Array, axis: Array) -> Array:
 
 
 def add_constraints(parent: ET.Element, data: dict[str, Any]) -> None:
-    """Add the cable and forearm clauses of an arm, as in MoBeE 2014, to the XML element `parent` of the arm's part."""
+    """Add the clauses of an arm, as in MoBeE 2014, to the XML element `parent` of the arm's part.
+
+    A clause is a condition on several motors of the arm, which the shoulder's cables and the forearm impose.
+    """
     for clause in data["shoulder_constraints"]["mobee_2014"]["full_cnf_per_arm"]:
         rows = element(parent, "constraintList")
         for row in clause:

@@ -32,7 +32,11 @@ LISTED_LENGTH = 1.0  # in the data, of an element that the file gives no length
 
 
 class Tree:
-    """The data of mobee_original with dicts for the search: nodes by id, motors by part, names and joints of motors, names of links."""
+    """The entry "mobee_original" of the JSON data, with dicts for look-ups: nodes by id, and names and joints of motors.
+
+    `data`: the whole JSON data.  `motors`: motors by part.  `axis`: name of a motor in YARP, by its name in the data.  `joints`: ids of the
+    joints that a motor drives, by its name in YARP.  `links`: name of the link that a joint moves in icub.xml, by the joint's name.
+    """
 
     def __init__(self, data: dict[str, Any]) -> None:
         model = data["mobee_original"]

@@ -28,7 +28,7 @@ def element(parent: ET.Element, tag: str, **attributes: str | float) -> ET.Eleme
 def vector(names: str, values: Array, digits: int = 7) -> dict[str, str]:
     """Return XML attributes with the components of a vector that are not zero, by name.
 
-    `names`: of the components, separated by spaces, as "px py pz".  `values`: the components.  `digits`: largest number of decimals.
+    `names`: names of the components, separated by spaces, as "px py pz".  `values`: the components.  `digits`: largest number of decimals.
     """
     texts = {name: number(value, digits) for name, value in zip(names.split(), values, strict=True)}
     return {name: text for name, text in texts.items() if text != "0"}

@@ -52,13 +52,13 @@ STATE_RATE = 100.0  # Hz, at which the iCub's motors report (thesis 2.3.2)
 class Record(TypedDict):
     """Counts of one measurement with a constant number of objects in the world.
 
-    `robot`: "katana" or "icub".  `objects`: number of boxes.  `edits`: boxes removed plus boxes created meanwhile; 0: measured without
-    edits.  `seconds`: duration.  `evaluations`: of the model.
+    `robot`: "katana" or "icub".  `objects`: number of boxes in the world.  `edits`: number of boxes that were removed plus number of boxes
+    that were added during the measurement; 0: nothing was edited.  `seconds`: duration.  `evaluations`: number of evaluations of the model.
     """
 
     robot: str
     objects: int
-    edits: int  # 0: without edits
+    edits: int
     seconds: float
     evaluations: int
 
@@ -79,7 +79,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
     """Measure the throughput for each robot, from where the run in `folder` was stopped; with --check, run the endurance test instead.
 
-    Returns the results: those of `results` or of `model_throughput_endurance.endure`.
+    Returns the rates of evaluations and edits by robot, as in `results`; with --check the counts and "passed" of the endurance test, as in
+    `model_throughput_endurance.endure`.
     """
     if arguments.check:
         return endure(folder, threads=arguments.threads, duration=arguments.duration or ENDURANCE_SECONDS, seed=arguments.seed)
@@ -104,10 +105,10 @@ def _line(record: Record) -> str:
 
 
 class Flood:
-    """Boxes in a world; random ones of them are replaced as fast as possible.
+    """Boxes in a world; random boxes are replaced as fast as possible.
 
-    `names`: names of the present boxes.  `robot`: short name of the robot, which selects where the boxes are.  `seed`: of their sizes and
-    positions, and of the choice.
+    `names`: names of the present boxes.  `robot`: short name of the robot, within whose reach the boxes are.  `seed`: of the sizes and
+    positions of the boxes, and of the choice which box is replaced.
     """
 
     def __init__(self, world: World, robot: str, seed: int) -> None:
@@ -135,10 +136,12 @@ class Flood:
 
 
 def flood_model(robot: str, *, first: int, last: int, edits: int, seed: int, is_over: Callable[[], bool]) -> Iterator[Record]:
-    """Run FLOOD_MODEL (thesis Algorithm 1) and yield a record for each number of objects from `first` to `last`.
+    """Evaluate the model of a moving robot while its world is edited, and yield a record for each number of objects from `first` to `last`.
 
-    `robot`: "katana" or "icub".  `edits`: number of boxes that are replaced at each number.  After each of NUMBERS there is a second
-    record, without edits.  The run ends early when `is_over()` returns True.  An exception of a thread is raised here.
+    This is FLOOD_MODEL, thesis Algorithm 1: one thread evaluates the model without a pause, this thread replaces boxes.  `robot`: "katana"
+    or "icub".  `edits`: number of boxes that are replaced at each number of objects.  `seed`: of the boxes and the motion.  If `first` is
+    1, a record without boxes and edits comes first.  At the numbers 1, 2, 5, 10, 20, ... 1000 (NUMBERS) a second record, without edits, is
+    added.  The run ends early when `is_over()` returns True.  An exception of the evaluating thread is raised here.
     """
     model = Model(load_robot(robot))
     flood = Flood(model.world, robot, seed)
@@ -178,10 +181,11 @@ def read_flood(path: Path) -> list[Record]:
 
 
 def results(records: list[Record], arguments: argparse.Namespace) -> dict[str, Any]:
-    """Return the rates of each robot, and under "complete" whether all numbers of objects were measured.
+    """Return the measured rates by robot, and under "complete" whether every robot had as many objects as the option --objects asks for.
 
-    For each robot: "evaluations_per_second_flooded" and "evaluations_per_second_still" (with and without edits), by number of objects;
-    "edits_per_second"; "objects_reached", the largest number.  `arguments`: the options of the run.
+    Keys for each robot: "evaluations_per_second_flooded" and "evaluations_per_second_still", dicts from a number of objects to the rate
+    with and without edits; "edits_per_second"; "objects_reached", the largest number of objects; and "note", only if the edits lasted less
+    than MIN_SECONDS (0.2 s).  `arguments`: the options of the run.
     """
     found: dict[str, Any] = {}
     for robot in arguments.robots:
@@ -201,11 +205,11 @@ def results(records: list[Record], arguments: argparse.Namespace) -> dict[str, A
 
 
 def rates(records: Iterable[Record]) -> Iterator[tuple[int, int]]:
-    """Yield pairs of a number of objects and evaluations per second, near each of NUMBERS that was measured.
+    """Yield pairs of a number of objects and evaluations per second, near each of the numbers 0, 1, 2, 5, 10, ... 1000 (NUMBERS).
 
-    Records within 10 % of the number are pooled.  If they last less than MIN_SECONDS (0.2 s), the next nearest records are added; if the
-    mean number of objects then differs by more than 10 %, this mean is yielded instead of the number.  A number is left out if all records
-    together last less than MIN_SECONDS.
+    A number that was not measured is left out.  Records within 10 % of the number are pooled.  If they last less than MIN_SECONDS (0.2 s),
+    the next nearest records are added; if the mean number of objects then differs by more than 10 %, this mean is yielded instead of the
+    number.  A number is also left out if all records together last less than MIN_SECONDS.
     """
     known = list(records)
     for number in NUMBERS:
@@ -249,7 +253,10 @@ def _point(group: Sequence[Record]) -> tuple[float, float]:
 
 
 def figure(folder: Path) -> Path:
-    """Draw the records of the run in `folder`, or its endurance test, to a file.  Returns its path; raises InvalidValue without records."""
+    """Draw the records of the run in `folder`, or of its endurance test if there was one, to a file, and return its path.
+
+    Raises InvalidValue without records.
+    """
     endured, records = read_records(folder / ENDURANCE, ENDURANCE_COLUMNS), read_flood(folder / RECORDS)
     if not endured and not records:
         raise InvalidValue(f"{folder} has no records: the run was stopped before the first.")

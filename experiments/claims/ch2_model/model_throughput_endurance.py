@@ -183,7 +183,8 @@ class WatchedWorld(World):
 def torn_table(snapshot: Snapshot) -> str | None:
     """Return a text that says how the tables of a snapshot differ from its objects; None if they agree exactly.
 
-    Compared are names, roles, the attached objects and the rows of volumes.  All objects must be boxes.
+    A snapshot is an unchanging copy of the world.  The compared tables are the names, the roles, the names of attached objects, and the
+    numbers that describe the volumes.  All objects must be boxes.
     """
     things = list(snapshot.objects.values())
     if not snapshot.names == tuple(snapshot.objects) == tuple(thing.name for thing in things):
@@ -214,7 +215,7 @@ def _rows_of_boxes(boxes: list[WorldObject]) -> Volumes:
 def other_objects(pose: Pose, snapshot: Snapshot) -> str | None:
     """Return a text that says how the objects of an evaluation differ from those of its snapshot; None if they are the same.
 
-    Objects that are attached to a link are not compared.
+    `pose`: the evaluation.  `snapshot`: the copy of the world that it used.  Objects that are attached to a link are compared by name only.
     """
     seen = pose.objects
     if tuple(seen) != snapshot.names:
@@ -274,10 +275,10 @@ def slope_mb_per_minute(seconds: Sequence[float], megabytes: Sequence[float]) ->
 
 
 class Judge:
-    """Checks every evaluation, in the thread that made it.
+    """Checks every evaluation of the model, in the thread that made it.
 
-    `torn`: number of occurrences of each error, by its text.  `references`: number of evaluations that were compared with a reference
-    model.
+    An evaluation is torn if it does not belong to one consistent state of the world.  `torn`: dict from the text of an error to how often
+    it occurred.  `references`: number of evaluations that were compared with a second model, whose world is built anew.
     """
 
     def __init__(self, model: Model, world: WatchedWorld, threads: int) -> None:
@@ -302,9 +303,9 @@ class Judge:
 
 
 class Endurance:
-    """An endurance run: the world, the moving model, the checks, and the editors of all threads.
+    """An endurance run: the world, the model of a moving robot, the checks of its evaluations, and an editor of the world for each thread.
 
-    `exceptions`: number of occurrences of each exception, by its traceback.  `samples`: pairs of time [s] and resident memory [MB].
+    `exceptions`: dict from the traceback of an exception to how often it occurred.  `samples`: pairs of time [s] and resident memory [MB].
     """
 
     def __init__(self, threads: int, seed: int) -> None:
@@ -338,9 +339,10 @@ class Endurance:
             self.exceptions["".join(traceback.format_exception(self.moving.error))] += 1
 
     def sample(self, seconds: float) -> dict[str, Any]:
-        """Store the resident memory, and return the present counts as a dict with ENDURANCE_COLUMNS as keys.
+        """Store the resident memory in `samples`, and return the present counts, a row of endurance.csv.
 
-        `seconds`: time since the start.
+        `seconds`: time since the start.  Keys: "seconds"; the numbers of "evaluations", "edits", "objects", "torn" (errors that the checks
+        found) and "exceptions"; "resident_mb", None on systems without /proc.
         """
         resident = resident_mb()
         if resident is not None:
@@ -352,8 +354,10 @@ class Endurance:
     def verdict(self) -> dict[str, Any]:
         """Return the counts and results of the run.
 
-        "passed": whether no evaluation was torn, no exception was raised, and the memory grew by less than MAX_SLOPE (0.5 MB/min).
-        "slope_mb_per_minute": None if the run was too short.
+        "passed": whether the checks found no error, no exception was raised, and the memory grew by less than MAX_SLOPE (0.5 MB/min).
+        "torn" and "exceptions": dicts from the text of an error to how often it occurred.  "slope_mb_per_minute": growth of the memory,
+        None if the run was too short; then it is not judged.  The other keys are numbers of threads, evaluations and edits, and the first
+        and last memory.
         """
         slope = slope_mb_per_minute(*zip(*self.samples, strict=True)) if self.samples else None
         is_sound = not self.judge.torn and not self.exceptions and self.moving.evaluations > 0
@@ -380,9 +384,10 @@ class Endurance:
 
 
 def endure(folder: Path, *, threads: int, duration: float, seed: int) -> dict[str, Any]:
-    """Run the endurance test with `threads` editing threads for `duration` s, and return `Endurance.verdict` and the duration.
+    """Run the endurance test with `threads` editing threads for `duration` s, and return its counts and results.
 
-    A record per second is written to endurance.csv in `folder`.
+    Keys: "seconds", the duration, and those of `Endurance.verdict`, among them "passed".  A row per second is written to endurance.csv in
+    `folder`, which is deleted first if it exists.  `seed`: of the boxes, the edits and the motion.
     """
     path = folder / ENDURANCE
     path.unlink(missing_ok=True)  # an interrupted endurance run starts again

@@ -115,8 +115,8 @@ class Box:
     """
 
     shape: Geometry
-    position: Array  # (3,) m
-    rotation: Array  # (3, 3)
+    position: Array
+    rotation: Array
 
 
 def random_boxes(rng: np.random.Generator, robot: str, count: int) -> list[Box]:

@@ -57,10 +57,11 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Run one search with this seed.
+    """Search for the minimum of a test function with one strategy, and return how long it took.
 
-    Keys: "evaluations", the number needed, at most `settings["most"]`; "found", whether the minimum was found; "us", own processor time of
-    the strategy per evaluation [us].
+    `settings`: name of the strategy and of the function, number of dimensions, and the limit "most" of evaluations.  Keys of the result:
+    "evaluations", the number needed, at most "most"; "found", whether the minimum was found; "us", own processor time of the strategy per
+    evaluation [us].
     """
     most = settings["most"]
     evaluations, us = search(settings["strategy"], settings["function"], settings["dimensions"], seed, most)
@@ -68,7 +69,10 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def evaluations(found: Cells) -> Runs:
-    """Return the evaluations of all seeds (seeds,), in the order of the seeds, by strategy and task (function, dimensions)."""
+    """Return the numbers of evaluations that the searches needed, by strategy and task, (seeds,) each, in the order of the seeds.
+
+    A task is a pair of a function's name and a number of dimensions.
+    """
     by_condition = runs_by(found, lambda result: float(result.values["evaluations"]), "strategy", "function", "dimensions")
     return {(key[0], (key[1], key[2])): np.array(values) for key, values in by_condition.items()}
 

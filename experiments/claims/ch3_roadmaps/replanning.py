@@ -75,7 +75,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Make the crossings that are not in `folder` yet, in launches of five, and return the results of all crossings."""
+    """Make the crossings that are not in `folder` yet, in launches of five, and return the results of all crossings.
+
+    In a crossing, the arm moves from the right of a ball to its left, and the ball becomes solid during the motion.
+    """
     count = QUICK_CROSSINGS if arguments.quick else arguments.crossings
     after = np.random.default_rng([arguments.seed, 432]).uniform(SOONEST, LATEST, count)
     pieces = [after[i : i + PIECE].tolist() for i in range(0, len(after), PIECE)]
@@ -93,14 +96,18 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 def results(folder: Path) -> dict[str, Any]:
-    """Compute the results, as of `findings`, from the measured crossings in `folder`; raises InvalidValue if there are none."""
+    """Return the counts, times and judged claims of the measured crossings in `folder`; raises InvalidValue if there are none.
+
+    The keys are those of `findings`.
+    """
     return findings(_crossings(folder))
 
 
 def cross(folder: Path, job: Job, seed: int, lockstep: bool = False, backend: str = PHYSICS[0]) -> dict[str, Any]:
-    """Launch a system that makes and records the crossings of a job in `folder`.  Returns the summary of the run; raises LaunchFailed.
+    """Launch a system that makes and records the crossings of a job in `folder`, and return the launcher's summary of the run.
 
-    `backend`: physics engine, "pybullet" or "mujoco".
+    `seed`: of the simulated robot.  `lockstep`: True: every tick waits for all services; False: ticks follow the clock.  `backend`: physics
+    engine, "pybullet" or "mujoco".  Raises LaunchFailed.
     """
     write_job(folder, job)
     names = {"world": str(WORLD), "simulated": str(SIMULATED), "backend": backend}
@@ -125,14 +132,14 @@ class Measures(Struct, frozen=True):
     motion to the request of the next.
     """
 
-    bumped: bool  # the arm touched the ball on the short path
-    command: float  # ms from the bump to the first command in force that was formed after the new goal
-    turn: float  # ms from the bump until the joints stop approaching the old goal
-    on: list[int]  # its targets in order, vertices
+    bumped: bool
+    command: float
+    turn: float
+    on: list[int]
     arrived: bool
     seconds: float  # from the start to the other side
-    deepest: float  # m, of a solid contact with the ball, by the simulator
-    thinking: float  # ms of processor time, from the end of the failed motion to the request
+    deepest: float
+    thinking: float
 
 
 def measure(folder: Path) -> list[Measures]:
@@ -189,9 +196,10 @@ def _turned(q: Array, bump: int, vertex: int, ended: int) -> int:
 
 
 def findings(crossings: Sequence[Measures]) -> dict[str, Any]:
-    """Return the results.
+    """Return the results of the crossings as a dict with the keys "live" and "claims".
 
-    Keys: "live", the numbers of all crossings: counts, and medians and maxima of the times [ms]; "claims", the judged claims.
+    "live": numbers of crossings, of those with a bump, and of those that arrived; and, if there was a bump, medians and maxima of the times
+    [ms] of `Measures`, and how often the arm took the path above the ball at once.  "claims": the judged claims.
     """
     bumped = [one for one in crossings if one.bumped]
     row: dict[str, Any] = {"crossings": len(crossings), "with_a_bump": len(bumped), "arrived": sum(one.arrived for one in crossings)}
@@ -240,9 +248,10 @@ CLAIMS = (around, soon, harmless)
 
 
 def figure(folder: Path) -> Path:
-    """Draw two rows of pictures as in thesis figure 4.7, through the ball and around it, and the times in a second file.
+    """Draw two filmstrips as in thesis figure 4.7, and return their path: the short path through the ball, and the path around it.
 
-    `folder`: of the run.  Returns the path of the pictures.
+    `folder`: of the run.  The second strip shows the first recorded crossing.  A second file gets the distributions of the times after the
+    bump.
     """
     plot_times(_crossings(folder)).savefig(folder / "replanning-times.png", dpi=110)
     kept = np.load(next(path for path in sorted(folder.glob("launch-*")) if (path / POSES).exists()) / POSES)

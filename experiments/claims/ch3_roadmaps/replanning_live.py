@@ -79,12 +79,12 @@ class Acted(Struct, frozen=True):
     at which the end was received.  `thinking`: processor time [s] between the end of the motion before and this request.
     """
 
-    vertex: int  # its target
-    asked: int  # tick of the request
-    commanded: int  # tick in which a command formed after the request was first in force
-    bump: int  # tick at which the model first said that the arm touches the ball, -1: never
-    ended: int  # tick at which its end was received
-    thinking: float  # s of processor time between the end of the motion before and the request
+    vertex: int
+    asked: int
+    commanded: int
+    bump: int
+    ended: int
+    thinking: float
 
 
 class Crossing(Struct, frozen=True):
@@ -93,7 +93,7 @@ class Crossing(Struct, frozen=True):
     `solid`: tick at which the ball was made solid.  `motions`: its motions, in order.
     """
 
-    solid: int  # tick at which the ball was made solid
+    solid: int
     motions: list[Acted]
 
 
@@ -129,9 +129,10 @@ def cross_undisturbed(crosser: Crosser, after: float) -> Crossing:
 
 
 class Crosser:
-    """A plant for `Walker` that moves the right arm, records its motions and makes the ball solid during a crossing.
+    """A plant that moves the right arm, records its motions and makes the ball solid during a crossing.
 
-    `motions`: the motions of the present crossing.  `hand`: the plant that moves the arm.
+    A `Walker`, which follows the edges of a roadmap, commands it.  `motions`: the motions of the present crossing.  `hand`: the plant that
+    moves the arm.
     """
 
     def __init__(self, service: Service, hand: ContactStopPlant) -> None:
@@ -176,7 +177,7 @@ class Crosser:
     def turn(self, solid: bool) -> None:
         """Make the ball solid or a ghost in the model, and place it in the simulator or remove it out of reach.
 
-        In free mode this does not wait for the answers; raises MobeeError if a service refuses.
+        In free mode, where ticks follow the clock, this does not wait for the answers; raises MobeeError if a service refuses.
         """
         role, place = "obstacle" if solid else "ghost", self._place if solid else AWAY
         if self._service.locked:
@@ -208,8 +209,8 @@ class ContactStopPlant(BusPlant):
 
     Args:
         service, robot, part: see BusPlant.
-        objects: names of the objects; fields count, so nothing is hit yet.
-        watcher: in lockstep, with the inbox of the service; None in free mode.
+        objects: names of the objects.  Overlap with a field, the larger volume around a link that is not solid, also counts as touch.
+        watcher: second service of this process, which shares the inbox of the first; None in free mode, where ticks wait for nobody.
     """
 
     def __init__(self, service: Service, robot: Robot, part: str, objects: Collection[str], watcher: Service | None = None) -> None:

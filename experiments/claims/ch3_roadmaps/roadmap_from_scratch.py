@@ -80,7 +80,7 @@ def model() -> Model:
 
 
 def joints() -> tuple[str, ...]:
-    """Return the names of the motors that the map moves: seven of the right arm."""
+    """Return the names of the seven motors of the right arm in which the poses of the map differ."""
     return robot().parts[PART].motors[:JOINTS]
 
 
@@ -129,8 +129,9 @@ class Depth:
 def explored(seed: int, most: int | None = None) -> dict[str, Any]:
     """Explore the map of a seed on the offline plant, with at most `most` motions along edges (None: until all are known).
 
-    Keys: those of `outcome`; "finished", and "why" not (an error's text); "minutes", robot time at the end of each motion; "deepest" and
-    "pair", the deepest solid contact [m]; "agree", the result of `agreement`.
+    Returns the map and its observations with the keys of `outcome`, and: "finished", whether all is known; "why", the text of the error
+    that ended the exploration, "" without one; "minutes", robot time [min] at the end of each motion; "deepest", depth [m] of the deepest
+    solid contact, and "pair", the names of its two shapes; "agree" (E,), for each tried edge whether another try had the same result.
     """
     plant = offline_plant(seed)
     depth, search = Depth(plant), explorer(plant, seed)
@@ -158,9 +159,10 @@ def outcome(roadmap: AdaptiveRoadmap, repairs: int) -> dict[str, Any]:
 
 
 def agreement(roadmap: AdaptiveRoadmap, seed: int) -> Array:
-    """Try each tried edge once more from rest at its vertex, on a new offline plant.
+    """Try each tried edge once more from rest at its vertex, on a new offline plant, and return which results are the same as before.
 
-    Returns for each of the E tried edges whether it succeeds or fails as in its last try, (E,).
+    The result (E,) has a value for each of the E tried edges: True if the new try ended like the last one, at the goal or elsewhere.
+    `seed`: of the encoder noise.
     """
     plant, space = offline_plant(seed), roadmap.space
     same = []
@@ -214,7 +216,7 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Explore the map of this seed offline, and return the result of `explored`."""
+    """Explore the map of this seed offline, and return the map and its measures, as in `explored`."""
     return explored(seed, settings["most"])
 
 
@@ -249,7 +251,9 @@ def _touched(launches: Sequence[Path]) -> dict[str, Any]:
 def read_live(folder: Path) -> dict[str, Any] | None:
     """Return the map and the measures of the live exploration in `folder`; None if it is not finished.
 
-    Keys: those of `outcome`, and "finished", "hours", "touches", "deepest" [m], "pair", "agree" and "edges".
+    Keys: those of `outcome`; "finished", whether all edges are known; "hours", robot time; "touches", solid contacts; "deepest", depth [m]
+    of the deepest one, and "pair", the names of its shapes; "agree" (E,), for each tried edge whether another try on the offline plant had
+    the same result; "edges", number of tried edges.
     """
     if not (folder / DONE).exists():
         return None
@@ -270,9 +274,10 @@ def unreached(values: Mapping[str, Any]) -> int:
 
 
 def findings(found: Cells, live: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Return the results of all cells and of the live exploration.
+    """Return the results of all cells (explorations, one for each seed) and of the live exploration.
 
-    Keys: "maps", the numbers of each map; "claims", the judged claims.  `live`: the result of `read_live`; None: not explored live.
+    Keys: "maps", a row for each map: minutes of robot time, numbers of edges, repairs and unreached samples, deepest solid contact;
+    "claims", the judged claims.  `live`: the result of `read_live`; None: not explored live.
     """
     results = sorted(found.values(), key=lambda result: result.cell.seed)
     rows = {f"seed {result.cell.seed}": _row(result.values) for result in results}
@@ -417,7 +422,10 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 def results(folder: Path) -> dict[str, Any]:
-    """Compute the results, as of `findings`, from the finished cells in `folder` and from its live exploration if there is one."""
+    """Return the rows of all maps and the judged claims, from the finished cells in `folder` and its live exploration if there is one.
+
+    The keys are those of `findings`.
+    """
     return findings(load_cells(folder), read_live(folder / "live"))
 
 

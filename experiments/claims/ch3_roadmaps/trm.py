@@ -85,8 +85,10 @@ def reachable(
 ) -> Array:
     """Return a dense set of task points that the robot can reach, (R, m).
 
-    Most are found by least squares on a lattice of half the spacing (m,), with many more starts per point than a map uses.  Others are
-    found by random starts at random points, which do not depend on neighbours.  The other arguments are those of `mobee.build_roadmap`.
+    Most points are found by least squares on a lattice of half the spacing, with many more starts per point than a map uses.  Others are
+    found by random starts at random points, which do not depend on neighbours.  `costs`: what each pose must satisfy.  `spacing`: of the
+    map, (m,).  `motors`: those that may move, None: all.  `start`: pose (n,) rad of the other motors, None: home.  `margin`: distance [rad]
+    of the poses from the motors' limits.  `seed`: of the random numbers.
     """
     rng = np.random.default_rng(seed)
     problem = Problem(model, costs, start, motors, margin)
@@ -115,8 +117,8 @@ def valid(
 ) -> NDArray[np.bool_]:
     """Return for each pose `q` (V, n) rad whether it is valid, (V,).
 
-    A valid pose meets all tolerances, the motors' limits and the box of the task, is at its task point in `y` (V, m), and moves only
-    `motors`.  Contacts are computed by python-fcl.
+    A valid pose meets the tolerances of all `costs`, the motors' limits and the box of the task, is at its task point in `y` (V, m), and
+    moves only `motors` (None: all) away from the pose `start` (None: home).  Contacts are computed by python-fcl, not by the compiled core.
     """
     reference = mobee.Model(solid_robot(model.robot), model.world, engine="fcl")
     pose = reference.evaluate(q)
@@ -168,7 +170,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def cells(arguments: argparse.Namespace) -> list[Cell]:
-    """Return the cells of the run: for each task one for the reachable part, and one for each map (method and seed).
+    """Return the cells (pieces of work): for each task one for the reachable part, and one for each map (method and seed).
 
     With --quick: three small tasks.
     """
@@ -185,7 +187,10 @@ def cells(arguments: argparse.Namespace) -> list[Cell]:
 
 
 def work(cell: Cell) -> dict[str, Any]:
-    """Do the work of one cell: build and measure a map, as `built`, or find the reachable task points ("points", (R, m))."""
+    """Do the work of one cell: build and measure a map, or find the task points that the robot can reach.
+
+    Returns the map and its measures with the keys of `built`, or the reachable task points (R, m) under "points".
+    """
     example, method = EXAMPLES[cell.settings["task"]](), cell.settings["method"]
     if method == REACH:
         spacing = np.broadcast_to(example.spacing, len(example.task.names)).astype(np.float64)
@@ -208,7 +213,10 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 def results(folder: Path) -> dict[str, Any]:
-    """Compute the results, as of `findings`, from the measures of all maps in `folder`."""
+    """Return the measures of all maps and the judged claims, computed from the file of measures in `folder`.
+
+    The keys are those of `findings`.
+    """
     measures = json.loads((folder / MEASURES).read_text())
     return findings(
         {
@@ -266,9 +274,11 @@ def findings(runs: Runs) -> dict[str, Any]:
 
 
 def maps(found: Cells) -> Runs:
-    """Return the measures (seeds,) of the maps, by task and method and then by the names in COLUMNS.
+    """Return the measures of the maps by (task, method): dicts from the name of a measure to its values (seeds,).
 
-    The coverage is NaN if the reachable points of the task are not known yet.
+    The names (COLUMNS) are "vertices"; "processor_s"; "evaluations_a_vertex"; "coverage", the share of the reachable task points within a
+    spacing of a vertex; "largest_hole", in spacings; "valid", "kept", "free" and "connected" as in `built`.  "coverage" and "largest_hole"
+    are NaN if the reachable points of the task are not known yet.
     """
     reach = {one.cell.settings["task"]: one.values["points"] for one in found.values() if one.cell.settings["method"] == REACH}
     built = sorted((one for one in found.values() if one.cell.settings["method"] != REACH), key=lambda one: one.cell.seed)
@@ -289,7 +299,10 @@ def are_complete(runs: Runs) -> bool:
 
 @claim("thesis 3.4, figs. 3.1-3.11", f"maps for all 13 tasks: at least {COVERED:.0%} of the reachable task space covered", "figures only")
 def maps_of_all(runs: Runs) -> Measured:
-    """Judge whether the maps of all tasks cover their task spaces; the thesis' own method, evolution, decides."""
+    """Judge whether the maps of all tasks of the thesis' figures cover at least 95 % (COVERED) of the reachable task points.
+
+    Returns the smallest coverages as text, and the verdict, which depends only on the maps by evolution, the method of the thesis.
+    """
     covered = {method: {task: float(runs[task, method]["coverage"].min()) for task in _figures()} for method in NAMES}
     return _least(covered), all(share >= COVERED for share in covered[NES].values())
 

@@ -69,7 +69,7 @@ def strip_of(example: Example, roadmap: Roadmap, poses: int = POSES) -> Strip:
 
 
 def planned(example: Example, roadmap: Roadmap) -> Motion:
-    """Return the motion along the shortest path in the roadmap through the points `via` of the example, in order."""
+    """Return the motion along the shortest path in the roadmap through the example's task points `via`, in order."""
     q = roadmap.q[roadmap.exit(example.via[0])][None]
     for y in example.via[1:]:
         q = np.concatenate([q, roadmap.path(q[-1], y)[1:]])
@@ -123,7 +123,8 @@ def main(argv: Sequence[str] | None = None) -> None:
 def draw_all(tasks: Sequence[str], method: Method, seed: int, out: Path) -> None:
     """Build and draw the map of every task, and print a line for each; with several tasks also draw sheets with all of them.
 
-    `tasks`: keys of EXAMPLES.  `seed`: of the maps.  `out`: folder of all files.
+    `tasks`: keys of EXAMPLES.  `method`: how poses are searched, "least_squares", "nes" or "hybrid".  `seed`: of the maps.  `out`: folder
+    of all files.
     """
     strips: dict[str, list[Strip]] = {}
     clouds = []

@@ -74,10 +74,10 @@ class Commanded(Struct, frozen=True, forbid_unknown_fields=True):
     command ended, by part: "over" (its time has passed), "settled", "timeout" or "refused" (ended by the safety layer).
     """
 
-    begin: int  # tick
-    end: int  # tick at which the outcome is judged
-    target: list[float]  # rad, all motors
-    endings: dict[str, Ending]  # by part
+    begin: int
+    end: int
+    target: list[float]
+    endings: dict[str, Ending]
 
 
 class CommandLog:
@@ -175,7 +175,9 @@ def run_trial(
 ) -> None:
     """Run a trial of `ticks` ticks, and write commands, positions, contacts and the launcher's summary into `folder`.
 
-    `mode`: "off", "one" or "two".  `show` is called with the finished share in [0, 1].  Raises TrialFailed, and LaunchFailed.
+    `mode`: "off" (without MoBeE), "one" (MoBeE 1.0) or "two" (MoBeE 2.0).  `seed`: of the random postures and the simulated robot.  `show`:
+    function that is called with the finished share in [0, 1].  `backend`: physics engine.  Raises TrialFailed if the ticks stop or the
+    system ends early, and LaunchFailed if it does not start.
     """
     folder.mkdir(parents=True, exist_ok=True)
     for left in (COMMANDS, POSITIONS):  # of an interrupted trial
@@ -207,17 +209,18 @@ def _size(path: Path) -> int:
 class Judged(Struct, frozen=True):
     """A command and its outcome.
 
-    `outcomes`: by part, "completed", "deflected" or "returned".  `endings`: by part, as in `Commanded`.  `left`: by part, the largest
-    remaining error of a motor [rad].  `duration`: [s].  `path`: length of the motors' paths, summed [rad].  `way`: the same for the
-    straight path to the target [rad].
+    `outcomes`: by part; "completed": the part came within 10 degrees of its target; "returned": it did not, and ended within 5 degrees of
+    its start; "deflected": it ended elsewhere.  `endings`: by part, how the command ended: "over" (its time has passed), "settled",
+    "timeout" or "refused" (ended by the safety layer).  `left`: by part, the largest remaining error of a motor [rad].  `duration`: [s].
+    `path`: length of the path, summed over all motors [rad].  `way`: the same for the straight path to the target [rad].
     """
 
-    outcomes: dict[str, Outcome]  # by part
-    endings: dict[str, Ending]  # by part
-    left: dict[str, float]  # by part: rad, remaining error of its worst motor
-    duration: float  # s
-    path: float  # rad, all motors together
-    way: float  # rad, straight path from begin to target, all motors together
+    outcomes: dict[str, Outcome]
+    endings: dict[str, Ending]
+    left: dict[str, float]
+    duration: float
+    path: float
+    way: float
 
 
 class Lockstep(Struct, frozen=True):
@@ -228,9 +231,9 @@ class Lockstep(Struct, frozen=True):
     """
 
     ticks: int
-    speed: float  # x real time
-    repeatable: bool  # all answered every tick in time
-    states_sha256: str  # of the state stream
+    speed: float
+    repeatable: bool
+    states_sha256: str
 
 
 class _Summary(Struct):
@@ -244,18 +247,19 @@ class Trial(Struct, frozen=True):
 
     `seconds`: robot time [s].  `commands`: outcomes of all commands.  `touches`: contacts of solids.  `beyond`: largest distance of a motor
     beyond a limit [rad], negative inside; `motor`: its name.  `speed_squared` and `jerk_squared`: means over ticks and motors, in (rad/s)^2
-    and (rad/s^3)^2.  `jerk_max`: [rad/s^3].  `path`: length of the motors' paths, summed [rad].  `lockstep`: of the launcher's summary.
+    and (rad/s^3)^2.  `jerk_max`: [rad/s^3].  `path`: length of the motors' paths, summed [rad].  `lockstep`: the part of the launcher's
+    summary that concerns lockstep.
     """
 
-    seconds: float  # robot time
+    seconds: float
     commands: list[Judged]
     touches: list[Touch]
-    beyond: float  # rad, largest distance beyond a limit; negative: inside
-    motor: str  # of that distance
-    speed_squared: float  # (rad/s)^2, mean over ticks and motors
-    jerk_squared: float  # (rad/s^3)^2, mean over ticks and motors
-    jerk_max: float  # rad/s^3
-    path: float  # rad
+    beyond: float
+    motor: str
+    speed_squared: float
+    jerk_squared: float
+    jerk_max: float
+    path: float
     lockstep: Lockstep
 
 

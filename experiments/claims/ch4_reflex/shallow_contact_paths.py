@@ -36,20 +36,22 @@ HIGHEST_START = 0.15  # m, of the palm
 class Spot:
     """A place at which the left hand just touches the table's field, and the direction of the paths through it.
 
-    `q`: posture there, (n,) rad.  `position` (3,) m and `rotation` (3, 3): pose of the palm, root frame.  `heading`: horizontal unit vector
+    The table's field is the zone around the table in which the hand's fields, larger volumes that are not solid, overlap the table.  `q`:
+    posture there, (n,) rad.  `position` (3,) m and `rotation` (3, 3): pose of the palm, root frame.  `heading`: horizontal unit vector
     (3,), root frame.
     """
 
-    q: Array  # (n,) rad
-    position: Array  # (3,) m, of the palm
-    rotation: Array  # (3, 3)
-    heading: Array  # (3,) unit vector, horizontal
+    q: Array
+    position: Array
+    rotation: Array
+    heading: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HandPath:
     """A path of the hand from above the table, through the beginning of the straight approach, into the table's field.
 
+    The table's field is the zone around the table in which the hand's fields, larger volumes that are not solid, overlap the table.
     `postures`: (w, n) rad.  `start`: index of the posture in which the straight approach begins.
     """
 
@@ -60,7 +62,8 @@ class HandPath:
 class Table:
     """The iCub at its table, and straight paths of its left hand into the table's field.
 
-    `robot`, `model`: the iCub and its model at the table.  `watch`: check for violations.
+    The table's field is the zone around the table in which the hand's fields, larger volumes that are not solid, overlap the table.
+    `robot`, `model`: the iCub and its model at the table.  `watch`: checks poses for contacts and for motors beyond limits and constraints.
     """
 
     def __init__(self) -> None:
@@ -80,7 +83,10 @@ class Table:
             self._home[self.robot.motor_index(name)] = np.deg2rad(degrees)
 
     def spots(self, number: int, seed: int) -> list[Spot]:
-        """Return `number` random spots through which there are paths at 90, 45 and 0 degrees to the table's top."""
+        """Return `number` random places at which the hand just touches the table's field, as `Spot`.
+
+        Through each of these places there are paths at 90, 45 and 0 degrees to the table's top.  `seed`: of the places.
+        """
         rng = np.random.default_rng([seed, 0x67])
         found: list[Spot] = []
         while len(found) < number:

@@ -63,7 +63,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return the conditions of the sweep: every angle at every spot.  Each seed has spots of its own."""
+    """Return the conditions of the sweep: every angle of approach at every spot, a place at which the hand touches the table's field.
+
+    Each seed has other spots.
+    """
     angles, spots, repeat = arguments.angles, arguments.spots, arguments.repeat
     if arguments.quick:
         angles, spots, repeat = QUICK_ANGLES, min(spots, QUICK_SPOTS), min(repeat, QUICK_REPEAT)
@@ -75,9 +78,9 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Run all variants with several noises at one spot and one angle.
+    """Run all variants ("off", "naive", "mended", "2.0") at one spot and one angle, each several times with different encoder noise.
 
-    Returns {"trials": the fields of `Trial` for each}; the list is empty if the hand has no path at this angle.
+    Returns a dict with the key "trials": a list of dicts with the fields of `Trial`.  It is empty if the hand has no path at this angle.
     """
     table, spot, angle = _table(), settings["spot"], settings["angle"]
     path = table.path(_spots(settings["spots"], seed)[spot], np.deg2rad(angle))
@@ -98,10 +101,13 @@ def _spots(count: int, seed: int) -> list[Spot]:
 
 
 class Truth:
-    """Records the depths of contacts, and the course of the first recovery, from the true joint positions.
+    """Records the depths of contacts, and the first recovery (motion back along earlier poses), from the true joint positions.
 
-    Its attributes mean the same as those of `Trial` with these names, except that `flips` is a number of changes, and `flicker` is in
-    ticks.
+    `depth`, `solid`: depth [m] of the deepest contact, and of the deepest contact of solids.  `progress`: largest distance [m] from the
+    start along the table.  `flips`: number of changes between contact and no contact, by the encoders.  `flicker`: ticks from the first
+    contact to the last pose without contact, by the encoders.  Of the first recovery, `again`: contact returned, by the encoders;
+    `came_back`: the same by the true positions; `never`: the hand was still in contact at its end; `deeper`: the motion back was deeper
+    than the stop.
     """
 
     def __init__(self, table: Table, path: HandPath) -> None:
@@ -168,36 +174,43 @@ class Truth:
 class Trial:
     """Measurements of a trial.
 
-    `angle`: degrees.  `depth`: depth of the deepest contact, of fields or solids [m], by the true positions; `solid`: the same for solids.
-    `switches`: changes of control per second.  `flips`: changes between contact and no contact per second, by the encoders.  `flicker`:
-    time [s] from the first contact to the last pose without contact by the encoders, for variant "off".  `reflexes`: their number.
+    `variant`: "off" (no reflex), "naive" (reflex of MoBeE 1.0), "mended" (the same with filter and dead time) or "2.0" (controller of MoBeE
+    2.0).  `angle`: of approach, degrees.  `spot`: number of the place.  `seed`: of the encoder noise.  `depth`: depth of the deepest
+    contact, of fields or solids [m], by the true positions; `solid`: the same for solids.  `switches`: changes of control per second.
+    `flips`: changes between contact and no contact per second, by the encoders.  `flicker`: time [s] from the first contact to the last
+    pose without contact by the encoders; 0 unless the variant is "off".  `reflexes`: number of reflexes.
 
-    First recovery: `again`: contact returned, by the encoders; `came_back`: the same by the true positions; `never`: still in contact at
-    the end; `deeper`: the motion back was deeper than the stop; `relapse`: the next reflex started within 0.3 s.  `settled`: whether the
-    arm settled, for variant "2.0".  `progress`: largest distance [m] from the start along the table.
+    Of the first recovery, `again`: contact returned, by the encoders; `came_back`: the same by the true positions; `never`: the hand was
+    still in contact at the end of the recovery or of the trial; `deeper`: the motion back was deeper than the stop; `relapse`: the next
+    reflex started within 0.3 s.  `settled`: whether the arm settled, for variant "2.0".  `progress`: largest distance [m] from the start
+    along the table.
     """
 
     variant: str
-    angle: float  # degrees
+    angle: float
     spot: int
     seed: int
-    depth: float  # m, deepest contact of any shape with the table, true joints
-    solid: float  # m, the same of solids
-    switches: float  # of control, per second
-    flips: float  # changes between contact and no contact by the encoders, per second
-    flicker: float  # s from the first contact to the last free pose by the encoders, variant `off`
+    depth: float
+    solid: float
+    switches: float
+    flips: float
+    flicker: float
     reflexes: int
-    again: bool  # first recovery: contact returned, by the encoders
-    came_back: bool  # the same, by the true joints
-    never: bool  # the hand was still in contact at the end of the recovery or of the trial
-    deeper: bool  # the motion back went deeper than the stop
-    relapse: bool  # the second reflex started within RELAPSE_TIME
-    settled: bool  # 2.0: by the controller's test
-    progress: float  # m, largest distance of the hand from the start, along the table
+    again: bool
+    came_back: bool
+    never: bool
+    deeper: bool
+    relapse: bool
+    settled: bool
+    progress: float
 
     @property
     def recovered(self) -> bool:
-        """Whether the first recovery succeeded (MoBeE 1.0 only)."""
+        """Whether the first recovery succeeded (MoBeE 1.0 only).
+
+        It succeeds if the hand ends without contact, touched nothing again and was not deeper while it moved back, and no reflex follows
+        within 0.3 s (RELAPSE_TIME).
+        """
         return self.reflexes > 0 and not (self.came_back or self.never or self.deeper or self.relapse)
 
     @property
@@ -209,7 +222,8 @@ class Trial:
 def run_trial(table: Table, path: HandPath, variant: str, angle: float, spot: int, seed: int) -> Trial:
     """Run a trial of 12 s and return its measurements.
 
-    `variant`: "off", "naive", "mended" or "2.0".  `angle`: of the path, in degrees; only stored.  `seed`: of the encoder noise.
+    `variant`: "off" (no reflex), "naive" (reflex of MoBeE 1.0), "mended" (the same with filter and dead time) or "2.0" (controller of MoBeE
+    2.0).  `angle`: of the path, degrees; it is only stored.  `spot`: number of the place; with `seed` it determines the encoder noise.
     """
     client = Client(table.robot, path, DT)
     body = _Body(table, client.start, np.random.default_rng([seed, spot, 0x677A]))
@@ -333,12 +347,12 @@ def _deflect(table: Table, client: Client, body: _Body, truth: Truth) -> bool:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the results of the sweep, as of `results`."""
+    """Return "passed", whether the claim holds, and for each variant the numbers by angle [degrees, as text], as in `summary`."""
     return results(_trials(found))
 
 
 def results(trials: Sequence[Trial]) -> dict[str, Any]:
-    """Return the numbers of `summary` by variant and angle [degrees, as text], and "passed", whether the claim holds."""
+    """Return "passed", whether the claim holds, and for each variant the numbers by angle [degrees, as text], as in `summary`."""
     angles = sorted({trial.angle for trial in trials}, reverse=True)
     table: dict[str, Any] = {
         variant: {f"{angle:g}": summary([t for t in trials if (t.variant, t.angle) == (variant, angle)]) for angle in angles}
@@ -348,9 +362,10 @@ def results(trials: Sequence[Trial]) -> dict[str, Any]:
 
 
 def summary(trials: Sequence[Trial]) -> dict[str, float]:
-    """Return the means and extremes over the trials of one variant at one angle.
+    """Return the means and extremes over the trials of one variant at one angle; without trials only their number, 0.
 
-    Keys: "trials", their number; those of SHARES, means over the trials; depths in mm; "progress_cm".
+    Keys: "trials", number of trials; the names in SHARES, such as "recovered" and "switches", with the means of these attributes of
+    `Trial`; "depth_mm_median", "depth_mm_max" and "solid_mm_max", depths of contacts; "progress_cm", mean distance along the table.
     """
     if not trials:
         return {"trials": 0}
@@ -369,10 +384,11 @@ def summary(trials: Sequence[Trial]) -> dict[str, float]:
 
 
 def holds(trials: Sequence[Trial]) -> bool:
-    """Whether the claim holds.
+    """Return whether the claim holds.
 
-    For angles of at most 3 degrees, "naive" must recover less often than for steep angles, and "mended" more often and with fewer changes
-    of control than "naive".  At all angles, "2.0" must settle without contact of solids.
+    For angles of at most 3 degrees, the variant "naive" (reflex of MoBeE 1.0) must recover less often than for steeper angles, and "mended"
+    (the same with filter and dead time) more often and with fewer changes of control than "naive".  At all angles, "2.0" (controller of
+    MoBeE 2.0) must settle without contact of solids.
     """
 
     def share(name: str, variant: str, low: bool) -> float:

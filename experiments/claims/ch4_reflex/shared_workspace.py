@@ -56,7 +56,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return a condition of the sweep for each protection (the keys of PROTECTIONS)."""
+    """Return a condition of the sweep for each protection of the two robots: none, reflexes of MoBeE 1.0, or controllers of MoBeE 2.0.
+
+    The names are the keys of PROTECTIONS.  The runs without controllers last a third of the minutes.
+    """
     minutes = QUICK_MINUTES if arguments.quick else arguments.minutes
     return [
         Condition(
@@ -73,7 +76,10 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Let both robots babble under a protection, and return the result of `shared_workspace_trial.run_trial`."""
+    """Let both robots babble under a protection, and return the times, contacts and counts of reflexes.
+
+    The keys are those of `shared_workspace_trial.run_trial`.
+    """
     return run_trial(settings["protection"], settings["minutes"], settings["paces"], seed)
 
 
@@ -127,10 +133,10 @@ CLAIMS = (controllers, reflexes, out_of_step)
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the results of the sweep.
+    """Return the results of the sweep as a dict with the keys "protections" and "claims".
 
-    Keys: "protections", the numbers of each protection; "claims", the judged claims.  "own, mm" is the depth of the deepest contact of a
-    robot with itself or the table.
+    "protections" has for each protection the number of "collisions" between the robots, "deepest, mm", the depth of the deepest contact
+    between them, "own, mm", that of a robot with itself or the table, and numbers of reflexes.  "claims": the judged claims.
     """
     groups = grouped(found, "condition", tuple(PROTECTIONS))
     rows = {

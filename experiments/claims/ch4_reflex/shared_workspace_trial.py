@@ -167,7 +167,7 @@ class Truth:
 
     `collisions`: number of contacts of solids between the robots that became deeper than DEEP (2 mm).  `deepest`: depth of the deepest one
     [m].  `deepest_own`: the same for a robot with itself or the table [m].  `path`: length of the paths of all motors, summed [rad].
-    `near`: number of contacts between the robots that concern fields, summed over all ticks.
+    `near`: number of contacts between the robots in which at least one volume is a field (not solid), summed over all ticks.
     """
 
     collisions: int = 0
@@ -209,7 +209,8 @@ def is_between(first: str, second: str) -> bool:
 def watch_of(robots: Sequence[str]) -> Callable[[Pose], list[Violation]]:
     """Return a function that returns the violations in a pose that concern the given robots.
 
-    `robots`: "icub", "katana" or both.  Violations are contacts with their shapes, limits and clauses.
+    `robots`: "icub", "katana" or both.  Violations are contacts with one of their shapes, motors beyond a limit, and clauses (constraints
+    on several joints) that do not hold.  The contact of the Katana's base with the table does not count.
     """
     watch, model = Watch(two_robots()), Model(two_robots(), load_world("table"))
     always = {one.what for one in watch.check(model.evaluate(two_robots().home))}  # the Katana's base on the table
@@ -230,8 +231,8 @@ def _is_of(robot: str, violation: Violation) -> bool:
 def babble(makers: Sequence[tuple[slice, Protected]], model: Model, minutes: float, seed: int) -> Truth:
     """Simulate both robots for `minutes` of robot time, and return the record of their contacts.
 
-    `makers`: for each protection, the slice of its motors and the protection.  A command that is computed from the encoders of tick k moves
-    the motors from tick k + 1 on, as in the live system.
+    `makers`: pairs of a slice of the motors of both robots, and the protected client that commands these motors.  `seed`: of the motors'
+    encoder noise.  A command that is computed from the encoders of tick k moves the motors from tick k + 1 on, as in the live system.
     """
     robot, parameters, truth = two_robots(), MotorParameters(), Truth()
     motors = Motors(robot, parameters, seed, robot.home)
@@ -252,8 +253,10 @@ def run_trial(protection: str, minutes: float, paces: Sequence[float], seed: int
     """Let both robots babble under a protection, and return the measurements.
 
     `protection`: "none", "reflexes", "one reflex" or "controllers".  `minutes`: robot time.  `paces`: number of recorded poses per tick
-    that the reflexes of iCub and Katana retrace.  Keys: "minutes", the fields of `Truth`, and "reflexes" and "stuck", counts of reflexes
-    and of stuck ones.
+    that the reflexes of iCub and Katana retrace.  `seed`: of postures and encoder noise.
+
+    Keys: "minutes"; "collisions", "deepest", "deepest_own", "path" and "near" as in `Truth`; "reflexes", number of reflexes; "stuck",
+    number of reflexes that found no pose without violation.
     """
     model = Model(two_robots(), load_world("table"))
     model.world.set_role("ball", "ghost")

@@ -46,13 +46,19 @@ Runs = Sequence[Mapping[str, Any]]
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return a condition of the sweep for each planner."""
+    """Return a condition of the sweep for each planner of the path to the pre-grasp (the keys of METHODS).
+
+    With --quick there are two seeds.
+    """
     seeds = tuple(range(arguments.seed, arguments.seed + QUICK)) if arguments.quick else ()
     return [Condition(name, {"method": name}, seeds=seeds) for name in METHODS]
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Make one trial with the planner `settings["method"]`; returns its measurements."""
+    """Let the robot grasp, lift and place a cup once, with the planner `settings["method"]`: "map", "learner" or "rrt".
+
+    `seed`: of the scene, the errors of the cameras and the plant.  Returns the fields of `experiments.kit.cup.trial.Result` by name.
+    """
     return run_trial(settings["method"], seed)
 
 

@@ -85,10 +85,11 @@ def rig() -> Rig:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Draw the camera errors of one robot, calibrate it by its hand, and show it balls.
+    """Draw the camera errors of one robot, calibrate its cameras with a tag on its own palm, and show it balls at N places.
 
-    Main keys: "before" and "after", errors of the ball's position (N,) m; "normalised", squared errors normalised by the covariance (N,);
-    "hand_before" and "hand_after", median errors of the hand [m]; "normalised_parameters", the normalised error of the calibration.
+    Main keys: "before" and "after", errors of the ball's position without and with the calibration (N,) m; "normalised", squared errors
+    after calibration, normalised by the covariance that the robot computes (N,); "hand_before" and "hand_after", median errors of the hand
+    [m]; "normalised_parameters", squared error of the calibrated parameters, normalised by their covariance.
     """
     chosen, model = CameraSettings(samples=2), Model(rig().robot, load_world("table"))
     errors = camera_errors(chosen, rig().robot, list(rig().cameras), seed)
@@ -242,9 +243,10 @@ def findings(found: Cells) -> dict[str, Any]:
 
 
 def plot(found: Cells) -> Any:
-    """Return a figure of the distributions of the position error before and after, and of the normalised error.
+    """Return a figure of the distributions of the position error before and after calibration, and of the normalised error.
 
-    The latter is drawn beside the distribution that a correct covariance has.
+    The normalised error is the squared position error, normalised by the covariance that the robot computes.  It is drawn beside the
+    distribution that it has if the covariance is correct, chi-squared with 3 degrees of freedom.
     """
     runs = grouped(found, "calibration", ("hand",))["hand"]
     drawing = new_figure(9.0, 3.6)

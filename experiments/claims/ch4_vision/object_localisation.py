@@ -167,10 +167,13 @@ class Robot:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Calibrate one robot, show it things, and then an empty table.
+    """Calibrate one robot, show it ball, cup and box, and then an empty table.
 
-    For each thing: "NAME_error" (N,) m, "NAME_normalised" (N,) and "NAME_size" (N, g), relative errors of its sizes.  Also "box_angle" (N,)
-    rad, and counts: "false_objects" (reported by the tracker), "false_places" (in single looks) and others.
+    For each thing that was seen N times: "NAME_error" (N,) m, distance from its true position; "NAME_normalised" (N,), squared error,
+    normalised by the covariance that the robot computes; "NAME_size" (N, g), relative errors of its g sizes.  "box_angle" (N,) rad: error
+    of the box's angle.  Numbers: "shown", gazes at things; "taken_for_another", places more than 5 cm wrong; "looks", pairs of pictures of
+    the empty table; "false_objects" and "false_places", what the tracker and single looks reported there; "false_regions", detected regions
+    per picture there; "detector_ms", processor time per picture.
     """
     robot = Robot(settings["world"], settings["postures"], seed, settings.get("detector", COLOR))
     return {**_with_things(robot, settings["gazes"]), **_without(robot, settings["looks"])}
@@ -299,7 +302,8 @@ def _row(run: Mapping[str, Any]) -> dict[str, Any]:
 def plot(found: Cells) -> Any:
     """Return a figure of the distributions of the position errors and of the normalised errors of each thing.
 
-    The latter are drawn beside the distribution that a correct covariance has.
+    The normalised error is the squared position error, normalised by the covariance that the robot computes.  It is drawn beside the
+    distribution that it has if the covariance is correct, chi-squared with 3 degrees of freedom.
     """
     runs = grouped(found, "world", ("things",))["things"]
     drawing = new_figure(9.0, 3.6)

@@ -74,10 +74,11 @@ def rig() -> Rig:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Let the Katana teach one iCub, and measure all localisers on the held-out poses.
+    """Let the Katana teach one iCub where things are, and measure stereo and all localisers on poses of the Katana that were held out.
 
-    Main keys: "errors, NAME", distances (N,) m from the true positions, for stereo and each localiser; "curves", median errors [m] of each
-    localiser by number of lessons, which are in "counts"; "robot_seconds", robot time of the teaching [s].
+    Main keys: "errors, NAME", distances (N,) m of the computed from the true positions, for stereo and each localiser; "curves", dict from
+    a localiser to its median errors [m], one for each number of lessons in "counts"; "held_out", number of lessons for the test;
+    "reported", median error [m] of the positions that the Katana reports; "robot_seconds", robot time of the teaching [s].
     """
     lessons, time = taught(settings["poses"], settings["looks"], seed)
     learned, held_out = split_by_pose(lessons.poses, HELD_OUT, seed)

@@ -64,13 +64,15 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 @dataclass
 class Search:
-    """The state of a search for the largest violation of a constraint.
+    """The state of a search for the largest violation of a constraint, a clause on several joints of an arm.
 
-    Violations are degrees along the normal of the constraint, the largest so far, negative inside.  `gains`: name of the gain set.
-    `forced`: whether a client pushes.  `tries`: number so far.  `worst`: of all tries; `by_clause`: of each clause.  `stop`: fastest impact
-    at a hard stop [deg/s].  `course`: pairs of tries and largest violation so far.  `inside`: of each generation of tries, with attractors
-    inside the joint box; `random`: of each random generation.  `elite`: for each clause, the worst commands.  `worst_try`: what is needed
-    to repeat the worst try.
+    Violations are degrees along the normal of the constraint, the largest so far, negative inside.  A generation is a group of up to 100
+    tries that are drawn in the same manner.  `gains`: name of the gain set.  `forced`: whether a client pushes.  `seed`: of the tries.
+    `tries`: number so far.  `worst`: violation of all tries.  `by_clause`: violation of each clause.  `stop`: fastest impact of a joint at
+    a hard stop [deg/s].  `course`: pairs of the number of tries and the largest violation so far.  `inside`: violation in each generation
+    by tries with attractors inside the joint box.  `random`: violation in each generation of random tries.  `elite`: for each clause, pairs
+    of a violation and the command that caused it, for the worst commands.  `worst_try`: commands, torso posture, seed, arm and clause of
+    the worst try, to repeat it.
     """
 
     gains: str
@@ -78,13 +80,13 @@ class Search:
     seed: int
     tries: int = 0
     worst: float = -360.0
-    stop: float = 0.0  # deg/s, the fastest impact at a hard stop
+    stop: float = 0.0
     by_clause: list[float] = field(default_factory=lambda: [-360.0] * CLAUSES)
-    course: list[tuple[int, float]] = field(default_factory=list)  # tries, largest violation so far
-    inside: list[float] = field(default_factory=lambda: [-360.0])  # of each generation, attractors inside the joint box
-    random: list[float] = field(default_factory=lambda: [-360.0])  # of each random generation
+    course: list[tuple[int, float]] = field(default_factory=list)
+    inside: list[float] = field(default_factory=lambda: [-360.0])
+    random: list[float] = field(default_factory=lambda: [-360.0])
     elite: list[list[tuple[float, list[float]]]] = field(default_factory=lambda: [[] for _ in range(CLAUSES)])
-    worst_try: dict[str, list[float] | list[list[float]] | int] = field(default_factory=dict)  # commands, torso, seed, arm, clause
+    worst_try: dict[str, list[float] | list[list[float]] | int] = field(default_factory=dict)
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
@@ -95,7 +97,7 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 def search(gains: str, forced: bool, tries: int, seed: int) -> Search:
     """Search for large violations: first by random tries, then by variations of the worst commands of each clause.
 
-    `gains`: name of the gain set.  `forced`: whether a client pushes.  `tries`: their number.  Returns the final state.
+    `gains`: name of the gain set.  `forced`: whether a client pushes.  `tries`: number of tries to make.  Returns the final state.
     """
     state, numbers = Search(gains, forced, seed), Gains.named(gains)
     while state.tries < tries:
@@ -145,10 +147,11 @@ def _record(state: Search, tried: Tried, commands: list[Command], torso: list[fl
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the results of the sweep, for each gain set and part ("attractors", "forced"); of several seeds the worst.
+    """Return the results as a dict from the gain set to its parts, "attractors" (no forces of a client) and "forced".
 
-    Violations are degrees along the normal, negative inside.  "passed": whether the default gains keep within "allowed_deg" without forces
-    of a client; None if they were not run.
+    Each part has the largest violations of a search, in degrees along the normal of a constraint, negative inside; of several seeds the
+    worst one.  "passed": whether the largest violation of the default gains without forces is below "allowed_deg" (2 degrees); None if they
+    were not run.
     """
     table: dict[str, Any] = {}
     for state in sorted(_searches(found), key=lambda state: state.worst):

@@ -137,7 +137,7 @@ class Pressed:
 
     solid: float
     field: float
-    chatter: float  # of the palms
+    chatter: float
 
 
 def press_targets(count: int) -> list[Array]:
@@ -247,7 +247,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Search for better gains, continuing after the gain sets in `folder`, and return the results."""
+    """Search for better gains until --sets gain sets are judged, continuing after those in `folder`, and return the results.
+
+    The keys are those of `results`.
+    """
     path = folder / RECORDS
     tried = read_tried(path)
     with Records(path, COLUMNS) as records, Progress() as progress:
@@ -272,7 +275,7 @@ class Tried:
 
     @property
     def objective(self) -> float:
-        """The objective of the search for this gain set, as of the function `objective`; smaller is better."""
+        """The settling time [s] plus prices of unmet requirements, which the search minimises, as in the function `objective`."""
         return objective(self.judged)
 
     def record(self) -> dict[str, object]:
@@ -334,8 +337,9 @@ def _changed(numbers: dict[str, float], step: float, rng: np.random.Generator) -
 def results(tried: list[Tried]) -> dict[str, Any]:
     """Return the default and the best gain set side by side.
 
-    "criteria", "gains" and "objective" have two numbers each: of the default and of the best.  "passed": whether no set is clearly better,
-    that is, has less than 0.8 of the default's objective.
+    "objective": values of the default and of the best gain set.  "criteria" and "gains": dicts from a name to two values, of the default
+    and of the best.  "judged": number of gain sets.  "passed": whether no set is clearly better, that is, has less than 0.8 of the
+    default's objective.
     """
     before, best = tried[0], min(tried, key=lambda one: one.objective)
     criteria = {name: [round(value, 4), round(asdict(best.judged)[name], 4)] for name, value in asdict(before.judged).items()}

@@ -84,9 +84,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Check the method, record the responses, fit the motors, and compare the plants; what is in `folder` already is not repeated.
+    """Identify the motors of the PyBullet robot from their responses, and compare it with the offline plant; steps that are done are kept.
 
-    Returns the results; "passed" says whether the check of the method was passed.
+    First the fit is checked on simulated motors with known parameters.  Then the responses are recorded in `folder`, the motor model is
+    fitted to them, and tables of the fitted values are written.  Returns "passed" and "method", the result of the check; "parameters",
+    "encoder_noise" and "residual", statistics of the fit as in `summary`; and "reproduced", the differences of motions as in `reproduce`.
     """
     robot = load_robot("icub")
     method = _check(arguments, robot, folder / METHOD)
@@ -251,8 +253,9 @@ def toml_data(robot: Robot, fit: Fit, seed: int) -> str:
 def summary(robot: Robot, fit: Fit) -> dict[str, Any]:
     """Return statistics of the fit over all motors.
 
-    "parameters": for each one the median, range and standard deviation, the published setting, and the largest distance from it in standard
-    deviations.  "encoder_noise" and "residual": of the encoders and of the fit.
+    "parameters": dict from each parameter to its unit, median, range and standard deviation, the published setting, and the largest
+    distance from it in standard deviations.  "encoder_noise": found and published noise [deg].  "residual": chi-square and largest misfit
+    [deg] of the fitted and of the held-out responses, with the motor that has it.
     """
     published, found = MotorParameters(), {}
     for name in FITTED:
@@ -281,7 +284,7 @@ def summary(robot: Robot, fit: Fit) -> dict[str, Any]:
 
 
 def encoder_noise(fit: Fit) -> float:
-    """Return the root mean square of the noise of all encoders [rad], at a tick of NOISE_PERIOD."""
+    """Return the root mean square of the noise of all encoders [rad], for ticks of 20 ms (NOISE_PERIOD)."""
     return float(np.sqrt(np.square(fit.noise).mean()))
 
 

@@ -39,17 +39,17 @@ UNIT = {"lag": ("s", 1.0), "delay": ("s", 1.0), "backlash": ("deg", 180.0 / np.p
 class Fit:
     """Fitted values of n motors, and the quality of the fit.
 
-    `parameters`: the values.  `deviation`: their standard deviations (n,), by name, in s, rad and rad/s.  `noise`: of the encoders at a
-    tick of NOISE_PERIOD, (n,) rad.  `chi_square`: of the fitted responses per degree of freedom, (n,); 1 if only encoder noise remains.
-    `misfit`: rms residual of the mean response beyond the noise, (n,) rad.  `held_out_chi_square` and `held_out_misfit`: the same for
-    signals that were not fitted.
+    `parameters`: fitted motor parameters.  `deviation`: dict from a parameter's name ("lag", "delay", "backlash", "friction") to its
+    standard deviations (n,) in s, s, rad and rad/s.  `noise`: of the encoders, for ticks of 20 ms (NOISE_PERIOD), (n,) rad.  `chi_square`:
+    of the fitted responses per degree of freedom, (n,); 1 if only encoder noise remains.  `misfit`: rms residual of the mean fitted
+    response beyond the noise, (n,) rad.  `held_out_chi_square` and `held_out_misfit`: the same for signals that were not fitted.
     """
 
     parameters: MotorParameters
-    deviation: dict[str, Array]  # lag, delay s; backlash rad; friction rad/s
-    noise: Array  # rad, of the encoders at a tick of NOISE_PERIOD
-    chi_square: Array  # of the fitted responses per degree of freedom: 1 if only encoder noise remains
-    misfit: Array  # rad, rms residual of the mean fitted response beyond the noise
+    deviation: dict[str, Array]
+    noise: Array
+    chi_square: Array
+    misfit: Array
     held_out_chi_square: Array
     held_out_misfit: Array
 

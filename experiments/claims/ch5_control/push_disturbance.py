@@ -90,7 +90,7 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Push the robot once, and return the result of `push_hand`."""
+    """Push the left hand of the robot once, and return the worst measurements by name, as in `push_hand`."""
     return push_hand(settings["law"], settings["direction"], settings["force"], seed)
 
 
@@ -99,9 +99,10 @@ def push_hand(law: str, direction: str, force: float, seed: int) -> dict[str, An
 
     `law`: name of the gain set, or "off": the commanded velocity is always 0.  `direction`: a key of DIRECTIONS.  `force`: N.
 
-    Keys: "moved_mm" and "away_mm", largest and last distance of the hand from its start; "solid_mm" and "beside_mm", depths of solid pairs
-    that are in the simulator's list and that are not; "pair", the deepest of the list; "field_mm", depth of fields; "clause_deg", violation
-    of a constraint, negative inside; "stop_deg_s", fastest impact at a hard stop.
+    Keys: "moved_mm" and "away_mm", largest and last distance of the hand from its start; "solid_mm" and "beside_mm", depths of contacts of
+    solids, of the pairs of shapes that the simulator tests too, and of all others; "pair", the deepest of the tested pairs; "field_mm",
+    depth of contacts of fields, volumes that are not solid; "clause_deg", violation of a constraint, negative inside; "stop_deg_s", fastest
+    impact at a hard stop.
     """
     gains = Gains.named("default" if law == "off" else law)
     if law == "off":
@@ -131,9 +132,12 @@ def push_hand(law: str, direction: str, force: float, seed: int) -> dict[str, An
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the results by law and direction: the smallest force [N] at which each event occurred, None if it did not occur.
+    """Return the results by law and direction: the smallest forces [N] with an event, and the deepest contact and last distance [mm].
 
-    "passed": whether with the default gains forces of at most 5 N cause no contact and no violation, and the hand returns; None if not run.
+    The events are contact of solids, violation of a constraint, and impact of a motor at its hard stop; the force is None if the event did
+    not occur.  The last distance of the hand from its start is the largest one after forces of at most 5 N.  "passed": whether with the
+    default gains forces of at most 5 N cause no contact of solids and no violation, and the hand returns to within 5 mm; None if they were
+    not run.
     """
     pushes = _pushes(found)
     table = {law: {direction: _summary(mine) for (of, direction), mine in pushes.items() if of == law} for law in LAWS}

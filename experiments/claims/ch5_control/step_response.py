@@ -109,7 +109,8 @@ def _posture(number: int, seed: int) -> Array:
 def findings(found: Cells) -> dict[str, Any]:
     """Return the median and the worst value of each measurement, by gain set, control period, and motors or postures.
 
-    "passed": whether all steps with the default gains meet the claim; None if they were not run.
+    "passed": whether all steps with the default gains settle, with at most 5 % overshoot, within 3 s (single motor) or 6 s (posture); None
+    if they were not run.
     """
     responses = _responses(found)
     table: dict[str, Any] = {}

@@ -83,9 +83,10 @@ def _ball() -> World:
 
 @cache
 def truths(change: str) -> tuple[Truth, Truth]:
-    """Measure the outcomes of all actions by a walk before and by a walk after a change; returns the frequencies before and after.
+    """Measure the frequencies of the outcomes of all actions, by a walk before and a walk after a change of the world.
 
-    `change`: "object" or "friction", as in `plant_of`.  The walks have a fixed seed, so they are the same in every process.
+    `change`: "object" or "friction", as in `plant_of`.  A walk tries every action 4 times, in at most 3000 transitions.  The walks have a
+    fixed seed, so they are the same in every process.  Returns the frequencies before and after.
     """
     before, after = (
         truth_of(arm_space(), walk(arm_space(), partial(plant_of, change, is_after), TRIES, MAX_WALK, WALK)) for is_after in (False, True)
@@ -173,8 +174,8 @@ class Run:
     """
 
     tried: Ints
-    series: Array  # (checks, 4): errors, then values, each of changed and of unchanged actions
-    at_change: float  # error of changed actions, before the first transition after the change
+    series: Array
+    at_change: float
     changed: NDArray[np.bool_]
     same: NDArray[np.bool_]
 
@@ -209,7 +210,7 @@ class Run:
 
     @property
     def value_jump_before(self) -> float:
-        """The number for `value_jump` without a change: it is computed from the last 500 transitions before the change.
+        """The ratio of `value_jump`, computed from the last 500 transitions before the change, when nothing has changed, for comparison.
 
         It is the largest value of the changed actions in these transitions, divided by their value just before these transitions.
         """
@@ -268,9 +269,10 @@ COLUMNS: dict[str, Number] = {
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the results: "agents" has a row for each change and agent, "claims" the judged claims.
+    """Return the results as a dict with two keys, "agents" and "claims".
 
-    If not every agent was run in full with both changes, the claims have no numbers.
+    "agents" has a row of numbers for each change and agent, "claims" the claims with their measured values and verdicts.  If not every
+    agent was run in full with both changes, all claims stay unmeasured and are not judged.
     """
     runs = runs_of(found)
     keys = [(change, *agent) for change, agent in product(CHANGES, AGENTS)]

@@ -131,7 +131,10 @@ class Run:
 
     @property
     def hard_visits(self) -> float:
-        """The mean visits of the hard states 24, 51 and 78, divided by the mean visits of all states."""
+        """The mean visits of the states 24, 51 and 78, divided by the mean visits of all states.
+
+        These states are hard to enter, because constraints make actions into them fail (thesis 7.2.5).
+        """
         return float(self.visits[list(HARD)].mean() / self.visits.mean())
 
     def share_failed(self, actions: Sequence[Action]) -> float:
@@ -149,7 +152,7 @@ class Run:
 
     @property
     def out_of_hard(self) -> list[Action]:
-        """All actions that start in one of the hard states 24, 51 and 78, as pairs of source and goal state."""
+        """All actions that start in the states 24, 51 and 78, which are hard to enter, as pairs of source and goal state."""
         return [(state, int(goal)) for state in HARD for goal in self.space.actions(state)]
 
 
@@ -181,9 +184,11 @@ COLUMNS: dict[str, Callable[[Run], float]] = {
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the results: "runs" has a row for each law, prior and discount, "claims" the judged claims.
+    """Return the results as a dict with two keys, "runs" and "claims".
 
-    If a prior or discount of the published law was not run, the claims have no numbers.
+    "runs" has a row for each combination of control law, prior and discount; the laws are the published one and its variants in `LAWS`.
+    "claims" is the list of the claims with their measured values and verdicts.  If runs of the published law are missing for some prior or
+    discount, all claims stay unmeasured and are not judged.
     """
     laws, rows = groups(found), {}
     for law, grouped in laws.items():

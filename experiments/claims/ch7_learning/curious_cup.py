@@ -58,8 +58,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
     """Return the settings of the runs: each of four agents in the first arrangement, or with --arrangements in all three.
 
-    The agents differ in what they perceive as the cup, and one acts at random.  With --quick the runs have 60 actions and two tries to push
-    the cup to a cell.
+    An arrangement is a set of postures of the hand and a grid of cells on the table.  Three agents are curious and perceive the cup, a
+    ghost of it at rest, or a ghost that repeats the motion of another run; one acts at random.  With --quick the runs have 60 actions and
+    two tries to push the cup to a cell.
     """
     transitions, tries, name = (QUICK, 2, "quick-") if arguments.quick else (TRANSITIONS, TRIES, "")
     return [
@@ -143,9 +144,11 @@ def pushed(runs: Runs) -> dict[str, list[float]]:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the results: "agents" has a row for each arrangement and agent, "claims" the judged claims.
+    """Return the results as a dict with two keys, "agents" and "claims".
 
-    If not every agent was run in full in the first arrangement, the claims have no numbers.
+    "agents" has a row of numbers for each arrangement (postures of the hand and cells on the table) and agent, "claims" the claims with
+    their measured values and verdicts.  If not every agent was run in full in the first arrangement, all claims stay unmeasured and are not
+    judged.
     """
     groups = grouped_by(found, "arrangement", "agent")
     runs = {agent: groups[MAIN, agent] for agent in AGENTS if (MAIN, agent) in groups}

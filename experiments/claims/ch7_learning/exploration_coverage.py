@@ -125,14 +125,15 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def shortest_walk(goals: Ints) -> int:
-    """Return the number of actions of the shortest walk over every action of a graph, between any two states, if all succeed.
+    """Return the smallest number of actions of a walk that takes every action of a graph at least once, if all actions succeed.
 
-    `goals` (S, A): goal state of each action, -1 where there is no action.  Raises InvalidValue unless every state can be reached from
-    every other state.
+    The walk may begin and end in any states.  `goals` (S, A): goal state of each action, -1 where there is no action.  Raises InvalidValue
+    unless every state can be reached from every other state.
 
-    This is the open directed Chinese postman's walk.  If more actions lead into a state than out of it, the walk must leave this state by
-    actions that it has already taken: it takes a shortest path to a state with more actions out of it than into it.  A minimal assignment
-    pairs these states.  One pair needs no path: the walk begins and ends there.
+    This is the open directed Chinese postman problem.  If a state has more actions into it than out of it, the walk must repeat actions to
+    leave it: it takes a shortest path to a state with more actions out of it than into it.  An assignment of minimal total length pairs the
+    states of the first kind with those of the second kind.  One state of each kind stays without a partner: the walk ends in the one of the
+    first kind, and begins in the one of the second kind.
     """
     from_state, action = np.nonzero(goals != NO_ACTION)
     to_state, states = goals[from_state, action], len(goals)
@@ -321,7 +322,11 @@ near_floor = {
     "at most 1.01",
 )
 def depletes(published: Published) -> Measured | None:
-    """Compare the explorers "depleting" and "nearest_untried" in both worlds; returns None if one of them was not run."""
+    """Judge whether the explorer "depleting" tries every action about as soon as "nearest_untried", in both worlds.
+
+    `published`: runs on the published graph by (world, agent).  Returns the ratios of their transitions as text, and the verdict: the ratio
+    must be at most 1.01.  Returns None if one of the explorers was not run.
+    """
     if any((world, name) not in published for world in FLOORS for name in ("depleting", "nearest_untried")):
         return None
     times = {world: [covered(published[world, name]) for name in ("depleting", "nearest_untried")] for world in FLOORS}

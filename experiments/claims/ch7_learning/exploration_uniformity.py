@@ -39,7 +39,10 @@ AS_UNIFORM = 1.1  # ratio of Gini coefficients up to which one counts as no less
 
 @cache
 def space_of(graph: str) -> Lattice:
-    """Return the lattice of 81 states of the left arm; `graph`: "nearest" (16 neighbours) or "equidistant" (neighbours)."""
+    """Return the lattice of 81 states of the left arm.
+
+    `graph`: "nearest": the neighbours of a state are the 16 nearest states; "equidistant": the states one level away along one joint.
+    """
     return arm_space(neighbours=ARM_NEIGHBOURS if graph == "nearest" else "equidistant")
 
 
@@ -153,9 +156,10 @@ COLUMNS: dict[str, Callable[[Explored], float]] = {
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the results: "runs" has a row for each graph and explorer, "claims" the judged claims.
+    """Return the results as a dict with two keys, "runs" and "claims".
 
-    If not every explorer was run on every graph, the claims have no numbers.
+    "runs" has a row of numbers for each graph and explorer, "claims" the claims with their measured values and verdicts.  If not every
+    explorer was run on every graph, all claims stay unmeasured and are not judged.
     """
     grouped, rows = groups(found), {}
     for (graph, explorer), runs in grouped.items():

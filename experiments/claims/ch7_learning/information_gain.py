@@ -56,9 +56,10 @@ def plant_of(part: str, seed: int) -> OfflinePlant:
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return the settings of the runs: both parts with both divergences.
+    """Return the settings of the runs: both parts ("left_arm", "torso") with both divergences that define the reward.
 
-    With --quick the runs have fewer transitions: 1000 of the arm and 300 of the torso.
+    The divergences are "kail" (thesis 6.4.2) and "kl", the plain KL divergence with a uniform prior.  With --quick the runs have fewer
+    transitions: 1000 of the arm and 300 of the torso.
     """
     counts = FEW if arguments.quick else TRANSITIONS
     return [
@@ -114,7 +115,9 @@ KINDS: dict[str, Outcome] = {"reliable": reliable, "failing": failing, "uncertai
 def rewards(part: str, divergence: str, outcome: Outcome, repeats: int = REPEATS) -> Array:
     """Simulate 30 tries of one action, and return the reward of each try [nats], (repeats, 30).
 
-    `part`: the part whose states are used.  `divergence`: the reward, "kail" or "kl".  `outcome`: draws the state in which the action ends.
+    `part`: the part whose states are used, "left_arm" or "torso".  `divergence`: the one that defines the reward, "kail" (thesis 6.4.2) or
+    "kl", plain KL with a uniform prior.  `outcome`: function that draws the state in which the action ends.  `repeats`: number of
+    simulations.
     """
     space, rng = space_of(part), np.random.default_rng(0)
     goal = int(space.goals[0, 0])
@@ -129,8 +132,9 @@ def rewards(part: str, divergence: str, outcome: Outcome, repeats: int = REPEATS
 def tries_to_prefer(part: str, divergence: str, kind: str) -> float:
     """Return the mean number of tries after which an action of the kind `kind` has a larger reward than a reliable action.
 
-    Both actions are tried equally often, and their last rewards are compared; larger means by more than 5 %.  `part`, `divergence`: as in
-    `rewards`.  `kind`: "failing" or "uncertain".  inf if 30 tries do not suffice in some repetition.
+    Both actions are tried equally often, and their last rewards are compared; larger means by more than 5 %.  `part`: "left_arm" or
+    "torso".  `divergence`: the one that defines the reward, "kail" or "kl".  `kind`: "failing" or "uncertain".  inf if 30 tries do not
+    suffice in some repetition.
     """
     other = rewards(part, divergence, KINDS[kind])
     plain = rewards(part, divergence, reliable, repeats=1)[0]
@@ -145,9 +149,10 @@ def groups(found: Cells) -> Groups:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the results: "runs" has a row for each part and divergence, "claims" the judged claims.
+    """Return the results as a dict with two keys, "runs" and "claims".
 
-    If not every part was run with every divergence, the claims have no numbers.
+    "runs" has a row of numbers for each part and divergence, "claims" the claims with their measured values and verdicts.  If not every
+    part was run with every divergence, all claims stay unmeasured and are not judged.
     """
     grouped = groups(found)
     rows = {

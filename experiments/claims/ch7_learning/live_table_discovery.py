@@ -73,16 +73,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def offline_cells(arguments: argparse.Namespace) -> list[Cell]:
-    """Return the cells that learn on the offline plant: one for each seed, at least two."""
+    """Return the cells (single runs) that learn on the offline plant: one for each seed, at least two."""
     number = _transitions(arguments)
     seeds = range(arguments.seed, arguments.seed + max(2, arguments.seeds))
     return [Cell(f"{TASK}-n{number}-s{seed}", seed, {"task": TASK, "transitions": number}) for seed in seeds]
 
 
 def live_cells(arguments: argparse.Namespace) -> list[Cell]:
-    """Return the cells that learn on the live system: one for each robot and seed; all robots run a seed before the next seed.
+    """Return the cells (single runs) that learn on the live system: one for each robot and seed.
 
-    With --quick there is one seed.
+    All robots run a seed before the next seed.  With --quick there is one seed.
     """
     number, seeds = _transitions(arguments), range(LIVE_SEED, LIVE_SEED + (1 if arguments.quick else arguments.live_seeds))
     return [
@@ -134,7 +134,10 @@ class Run:
 
     @property
     def lean(self) -> float:
-        """How often the torso leans forward, in the second half of the run: mean tries of these actions over those of its other actions."""
+        """How often the torso leans forward, in the second half of the run.
+
+        This is the mean number of tries of its actions with a goal state that leans forward, divided by that of its other actions.
+        """
         lattice = _spaces()["torso"]
         tries = counts_of(_late(self.result.values["seen_torso"]), lattice).sum(axis=-1)
         forward = (lattice.goals >= FORWARD_STATES.start) & (lattice.goals < FORWARD_STATES.stop)
@@ -165,8 +168,9 @@ def runs_in(folder: Path) -> Runs:
 def distances(runs: Runs) -> dict[str, list[Distance]]:
     """Return how far the outcomes of each run are from those of the offline runs, by robot, in the order of the runs.
 
-    An offline run is compared with all other offline runs together.  A live run is compared with all offline runs except one, and the
-    distance is averaged over the run that is left out.
+    A distance has the mean total variation of the outcomes of an action, and the share of actions with the same most frequent outcome.  An
+    offline run is compared with all other offline runs together.  A live run is compared with all offline runs except one, and the distance
+    is averaged over the run that is left out.
     """
     offline = [run.counts for run in runs[OFFLINE]]
     together = {part: np.sum([counts[part] for counts in offline], axis=0) for part in offline[0]}
@@ -193,9 +197,10 @@ NUMBERS: dict[str, Callable[[Run], float]] = {"touch": lambda run: run.touch, "l
 
 
 def results(folder: Path) -> dict[str, Any]:
-    """Compute the results from the finished cells in the folder: the claims, and rows for the runs and for contacts at the table.
+    """Compute the results from the finished cells (runs of one robot and seed) in the folder.
 
-    Raises InvalidValue if fewer than two offline seeds are finished.
+    Keys: "transitions" of each agent; "runs", rows by robot; "at the table", rows by robot and part: how its actions ended there; "claims",
+    the judged claims.  Raises InvalidValue if fewer than two offline seeds are finished.
     """
     runs = runs_in(folder)
     apart = distances(runs)

@@ -63,10 +63,10 @@ MOST = 0.5  # share of the state-actions
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return the settings of the runs: what the agent learns with, and the roadmaps that need no learning.
+    """Return the settings of the runs: three kinds of training of the agent, and the roadmaps, which need no training.
 
-    The agent learns without the table ("still"), with a table that moves ("moving"), or with one that enters ("enters", with and without
-    forgetting).  With --quick there are 10 queries instead of 60, and a quarter of the transitions.
+    The agent learns without the table ("still"), with a table that moves ("moving"), or with one that enters ("enters"); in the last case
+    it forgets nothing, or forgets with the factor 0.9.  With --quick there are 10 queries instead of 60, and a quarter of the transitions.
     """
     settings: dict[str, Any] = {"queries": 10, "share": 0.25} if arguments.quick else {"queries": QUERIES, "share": 1.0}
     lasting = [Condition(condition, settings | {"training": condition}) for condition in ("still", "moving", "roadmap")]
@@ -74,12 +74,12 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Learn with one kind of table, then send the arm to the goals of the queries by plans.
+    """Train an agent with one kind of table, then send the arm to the goals of the queries by plans; roadmaps are tested without training.
 
-    Returns `tests`: the measures by kind of planner ("plans" of the MDP, or roadmaps "planned once", "repairs", "remembers") and by
-    position of the table ("down", "moving", "up").  After learning without the table or with one that moves, also the transitions `seen`
-    (T, 3), the counts of `fates`, and the model's `outcomes` and `probabilities` (S, A, B).  If the table enters, returns instead `rows`,
-    the measures with the raised table, and `after`, the numbers of transitions since it entered.
+    Returns `tests`, nested dicts to numbers: by planner ("plans" of the MDP, or the roadmaps "planned once", "repairs", "remembers"), by
+    position of the table ("down", "moving", "up"), and by measure as in `tested`.  After training without the table or with one that moves,
+    also the transitions `seen` (T, 3), the counts of `fates`, and the model's `outcomes` and `probabilities` (S, A, B).  If the table
+    enters, returns instead `rows`, the measures with the raised table, and `after`, the numbers of transitions since it entered.
     """
     condition, share, space = settings["training"], settings["share"], arm_space(RANK3, ARM_NEIGHBOURS)
     plant = TablePlant(seed, moves=condition == "moving")
@@ -150,26 +150,32 @@ def runs_of(found: Cells) -> Runs:
 
 
 def tested(runs: Runs, condition: str, test: str, measure: str, mode: str = "plans") -> Array:
-    """Return a measure of the plans of each run, (seeds,).
+    """Return a measure of the queries of each run, (seeds,).
 
-    `condition`: "still", "moving" or "roadmap".  `test`: position of the table, "down", "moving" or "up".  `measure`: "success", "actions",
-    "touched", "met" or, for the MDP, "promised", "kept" or "through".  `mode`: "plans" for the MDP; for a roadmap "planned once", "repairs"
-    or "remembers".
+    `condition`: "still", "moving" or "roadmap".  `test`: position of the table, "down", "moving" or "up".  `measure`: "success", share of
+    queries; "actions", per query; "touched", share of actions that end at the table; "met", share of queries with such an action; and for
+    the MDP "promised", the predicted probability that a plan is followed, "kept", the share of plans that are followed, and "through", the
+    share of states on the path in which the raised table is.  `mode`: "plans" for the MDP; for a roadmap "planned once", "repairs" or
+    "remembers".
     """
     return np.array([run["tests"][mode][test][measure] for run in runs[condition, None]])
 
 
 def entering(runs: Runs, forgetting: float) -> tuple[list[int], dict[str, Array]]:
-    """Return the numbers of transitions since the table entered, and by name the measures of plans after them, (seeds, points).
+    """Return the numbers of transitions since the table entered, and the measures of plans after them.
 
-    `forgetting`: the factor with which the agents forget; 1: nothing is forgotten.
+    `forgetting`: the factor with which the agents forget; 1: nothing is forgotten.  The measures are a dict from the name, as in `tested`,
+    to values (seeds, points), a column for each number of transitions.
     """
     group = runs["enters", forgetting]
     return list(group[0]["after"]), {m: np.array([[point[m] for point in run["rows"]] for run in group]) for m in MEASURES}
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the results: "claims" with the judged claims, and the tables of `tables`."""
+    """Return the results as a dict with the keys "claims", "plans executed" and "after the table entered".
+
+    "claims" has the judged claims, the others are tables of measures, as in `tables`.
+    """
     runs = runs_of(found)
     return {"claims": judged(CLAIMS, runs), **tables(runs)}
 

@@ -134,7 +134,9 @@ def truths(found: Cells) -> dict[str, OutcomeModel]:
 def errors(found: Cells, known: Mapping[str, OutcomeModel]) -> dict[tuple[str, str], Array]:
     """Return the L1 errors of the models learned in each run, (seeds, times, columns), by world and explorer.
 
-    `known`: the true outcomes by world; other worlds are left out.  The times and columns are those of `error_curve`.
+    `known`: the true outcomes by world; worlds that are absent are left out.  `times` returns the times, numbers of transitions.  Columns 0
+    and 1: errors with imagined outcomes, pseudo-counts from before the first try, over all and over stochastic actions; columns 2 and 3:
+    the same with debiased counts, which replace the pseudo-counts by a weak prior.
     """
     return {
         (world, explorer): np.array([error_curve(world, known[world], one["seen"]) for one in results])
@@ -151,8 +153,9 @@ def times(world: str) -> list[int]:
 def error_curve(world: str, truth: OutcomeModel, seen: Ints) -> Array:
     """Learn a model again from recorded transitions, and return its L1 errors at the times of `times`, (times, columns).
 
-    `seen`: (T, 3), state, action, state reached.  Columns: with imagined outcomes, over all and over stochastic actions; then without
-    imagined outcomes.  NaN at times beyond the last transition, and in the columns of stochastic actions if there are none.
+    `seen`: (T, 3), state, action, state reached.  Columns 0 and 1: errors with imagined outcomes, pseudo-counts from before the first try,
+    over all and over stochastic actions; columns 2 and 3: the same with debiased counts, which replace the pseudo-counts by a weak prior.
+    NaN at times beyond the last transition, and in the columns of stochastic actions if there are none.
     """
     model, at = TransitionModel(space_of(world)), times(world)
     beliefs = (model, model.debiased())
@@ -259,9 +262,12 @@ CLAIMS = (
 
 
 def plot(found: Cells) -> Any:
-    """Draw the L1 errors of the models over the transitions, a column for each world.
+    """Draw the L1 error of the learned transition models over the number of transitions: a column for each world, a color per explorer.
 
-    Upper panels: all actions, dashed with imagined outcomes.  Lower panels: stochastic actions.  Returns a matplotlib figure.
+    The curves are medians over the seeds.  The upper panels show the mean error over all actions, of two models: a dashed line is the model
+    whose probabilities include the imagined outcomes, which are pseudo-counts from before the first try; a solid line is the model with
+    debiased counts, which replace them by a weak prior.  The lower panels show the mean error of the debiased model over the stochastic
+    actions, whose most likely outcome has a probability below 0.9.  Returns a matplotlib figure.
     """
     curves = errors(found, truths(found))
     worlds = [world for world in WORLDS if any(key[0] == world for key in curves)]

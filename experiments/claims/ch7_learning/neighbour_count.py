@@ -110,8 +110,8 @@ class Attempt(NamedTuple):
 def attempt(model: TransitionModel, plant: OfflinePlant, start: int, goal: int, most: int) -> Attempt:
     """Move the arm to the state `start`, and follow the model's plan to the state `goal` by at most `most` actions.
 
-    The plan maximises the discounted probability of entering the goal state, according to the counts without imagined outcomes.  The model
-    learns nothing.
+    The plan maximises the discounted probability of entering the goal state.  It uses the debiased counts, in which a weak prior replaces
+    the imagined outcomes from before the first try.  The model learns nothing.
     """
     space = model.space
     beliefs = model.debiased()
@@ -160,9 +160,10 @@ def learning_times(runs: list[Run]) -> list[int]:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the results: "runs" has a row for each graph, "claims" the judged claims.
+    """Return the results as a dict with two keys, "runs" and "claims".
 
-    If not all graphs were run, the claims have no numbers.
+    "runs" has a row of numbers for each graph, "claims" the claims with their measured values and verdicts.  If not all graphs were run,
+    all claims stay unmeasured and are not judged.
     """
     grouped = groups(found)
     rows = {f"{graph} neighbours": _row(runs) for graph, runs in grouped.items()}
@@ -186,9 +187,10 @@ def _fewer(grouped: Groups) -> dict[int, list[Run]]:
 
 @claim("paper 4.1", "fewer neighbours shorten learning: transitions until every action was tried once", "qualitative")
 def sooner(grouped: Groups) -> Measured:
-    """Compare the learning times of the published graph and of sparser graphs.
+    """Judge whether every action is tried sooner, the fewer neighbours the states of a graph have, from the published 16 downwards.
 
-    The claim is open if a run did not try every action, because the runs that did are the faster ones.
+    Returns the learning times by graph as text, and the verdict.  It is None, open, if a run did not try every action, because the runs
+    that did are the faster ones.
     """
     times = {graph: learning_times(runs) for graph, runs in _fewer(grouped).items()}
     middle = {graph: interquartile_mean(found) for graph, found in times.items() if found}

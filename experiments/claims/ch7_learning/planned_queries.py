@@ -119,16 +119,19 @@ class Queries:
         """Follow plans made with a transition model through all queries, and return the measures by name.
 
         `beliefs`: outcomes and probabilities of the actions.  `test`: position of the table, "down", "up" or "moving" (drawn for every
-        query).  The measures are the numbers of `Followed`, "promised" and "kept" of `promises`, and "through" of `through`.
+        query).  The measures are "success", "actions", "touched" and "met" as in `Followed`; "promised", the predicted probability that all
+        actions of a plan end as planned; "kept", the share of queries that passed exactly the planned states; and "through", the share of
+        states on the paths in which the arm would touch the raised table.
         """
         followed = self._followed(FrozenModel(self.space, beliefs), test)
         promised, kept = promises(self.space, beliefs, self.pairs, followed.paths)
         return followed.numbers() | {"promised": promised, "kept": kept, "through": through(followed.paths, self.blocked)}
 
     def in_all_worlds(self, rival: Rival) -> dict[str, dict[str, float]]:
-        """Let a planner answer all queries with each position of the table; returns the numbers of `Followed`.
+        """Let a planner answer all queries with each position of the table, and return the measures as nested dicts.
 
-        The keys are the position, "down", "moving" (drawn for every query) or "up", and the name of the number.
+        The keys are the position, "down", "moving" (drawn for every query) or "up", and then "success", "actions", "touched" and "met" as
+        in `Followed`.
         """
         return {test: self._followed(rival, test).numbers() for test in TESTS}
 
@@ -191,9 +194,10 @@ class Followed:
 
 
 def follow(space: Lattice, rival: Rival, pairs: Sequence[tuple[int, int]], tops: Sequence[float], seed: int) -> Followed:
-    """Let a planner send the arm from the sample of a start state to a goal state, in each of the queries.
+    """Let a planner send the arm from the sample of a start state to a goal state, in each of the queries; return the measures.
 
-    `pairs`: start state and goal state of each query.  `tops`: height of the table's top in each query [m].  The arm begins at rest.
+    `pairs`: start state and goal state of each query.  `tops`: height of the table's top in each query [m].  `seed`: of the plant's noise.
+    The arm begins at rest.  A query ends at its goal state, after 20 actions (MAX_ACTIONS), or when the planner gives up.
     """
     plant = TablePlant(seed + 900)
     touched = met = 0

@@ -55,7 +55,7 @@ class Variant:
     gains: dict[str, Any] = field(default_factory=dict)
     settle: dict[str, float] = field(default_factory=dict)
     motors: dict[str, float] = field(default_factory=dict)
-    dt: float = DT  # s
+    dt: float = DT
     gain_set: Callable[[], Gains] = Gains.published_2014
     motor_set: Callable[[], MotorParameters] = MotorParameters
     robot: Callable[[], Robot] = robot
@@ -160,35 +160,42 @@ def summary(values: dict[str, Any]) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Row:
-    """The results of one variant, as means over its runs.
+    """The results of one variant, as means over its runs; "57->61" is the action from state 57 to state 61.
 
     On rank 4: `never`, how many of the states 60, 124, 188 and 252 were never reached; `hardly`, visits of each of 61, 125, 189 and 253;
     `others`, number of other states never reached; `deflected`, share of the tries of 57->61, 121->125 and 249->253 that ended one pitch
-    level higher; `where`, state in which 57->61 ended most often; `uncertain`, number of actions with several outcomes.  On rank 3:
-    `failing`, share of the tries of 15->24, 42->51 and 69->78 that failed; `entering`, the same of 21->24.  On both: `timeouts`, share of
-    actions that timed out; `seconds`, plant time per action.
+    level higher; `where`, state in which 57->61 ended most often; `uncertain`, number of actions that ended in more than one state.  On
+    rank 3: `failing`, share of the tries of 15->24, 42->51 and 69->78 that failed; `entering`, the same of 21->24.  On both: `timeouts`,
+    share of actions that timed out; `seconds`, plant time per action.
     """
 
-    never: float  # how many of the four states were never reached
-    hardly: float  # visits of each of the other four
-    others: float  # states never reached besides these eight
-    deflected: float  # share of tries of the three deflected actions that ended one pitch level higher
-    where: str  # state in which 57->61 ended most often
-    failing: float  # share of failures of the rank 3 actions that fail as published
-    entering: float  # share of failures of 21->24
-    uncertain: float  # actions of rank 4 that ended in more than one state
-    timeouts: float  # share of actions
-    seconds: float  # plant time per action
+    never: float
+    hardly: float
+    others: float
+    deflected: float
+    where: str
+    failing: float
+    entering: float
+    uncertain: float
+    timeouts: float
+    seconds: float
 
     @property
     def rank4(self) -> bool:
-        """Whether the published findings on the lattice of rank 4 (256 states) are reproduced."""
+        """Whether the published findings on the lattice of rank 4 (256 states) are reproduced (thesis 7.3).
+
+        They are: the four states of `never` and no others are never reached, those of `hardly` at most 4 times, and at least 90 % of the
+        tries of the actions of `deflected` are deflected.
+        """
         rare, deflected = self.hardly <= MAX_RARE_VISITS, self.deflected >= MIN_DEFLECTED
         return self.never == len(NEVER) and rare and self.others == 0 and deflected
 
     @property
     def rank3(self) -> bool:
-        """Whether the published findings on the lattice of rank 3 (81 states) are reproduced."""
+        """Whether the published findings on the lattice of rank 3 (81 states) are reproduced (thesis 7.2.5).
+
+        They are: at least half of the tries of the actions of `failing` fail, and at most 10 % of those of `entering`.
+        """
         return self.failing >= MIN_FAILING and self.entering <= 1.0 - MIN_DEFLECTED
 
     @property
@@ -256,9 +263,10 @@ def _share(space: Lattice, runs: Sequence[Ints], ends: Mapping[tuple[int, int], 
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the results: "variants" has a row for each variant, "claims" the judged claims.
+    """Return the results as a dict with two keys, "variants" and "claims".
 
-    If not all variants were run in full, the claims have no numbers.
+    "variants" has a row for each variant of the plant, as in `Row.record`, "claims" the claims with their measured values and verdicts.  If
+    not all variants were run in full, all claims stay unmeasured and are not judged.
     """
     rows = rows_of(found)
     whole = set(rows) == set(VARIANTS) and all(len(result.values["rank4"]) == ACTIONS["rank4"] for result in found.values())

@@ -93,9 +93,10 @@ CLAIMS = (uniform, collected, faster)
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the results: "runs" has two rows for each explorer (mean and largest reward), "claims" the judged claims.
+    """Return the results as a dict with two keys, "runs" and "claims".
 
-    If not every explorer was run, the claims have no numbers.
+    "runs" has two rows for each explorer (mean and largest reward), "claims" the claims with their measured values and verdicts.  If not
+    every explorer was run, all claims stay unmeasured and are not judged.
     """
     groups = grouped(found, "explorer", EXPLORERS)
     rows: dict[str, Any] = {}

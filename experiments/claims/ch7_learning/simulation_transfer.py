@@ -55,7 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def cells(arguments: argparse.Namespace) -> list[Cell]:
-    """Return the cells that learn on the offline plant: one for each task ("arms", "table") and seed, at least two seeds."""
+    """Return the cells (single runs) that learn on the offline plant: one for each task ("arms", "table") and seed, at least two seeds."""
     number = _transitions(arguments)
     seeds = range(arguments.seed, arguments.seed + max(2, arguments.seeds))
     return [Cell(f"{task}-s{seed}", seed, {"task": task, "transitions": number}) for task in _tasks(arguments) for seed in seeds]
@@ -80,9 +80,10 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 def results(folder: Path) -> dict[str, Any]:
-    """Compute the results from the transitions in the folder: the distances between the models, and the judged claim.
+    """Compute the results from the transitions in the folder as a dict with the keys "claims" and "distances".
 
-    With runs at the table, also how the actions of each part ended there.
+    "claims" has the judged claim; "distances" has a row for each task and robot, with the distance of its learned transition model from
+    those of the offline plant.  With runs at the table, further keys say how the actions of each part ended there.
     """
     tasks = _compared(folder)
     table = {f"{task}, {robot}": row for task, found in tasks.items() for robot, row in _rows(found).items()}

@@ -106,9 +106,12 @@ Number = Callable[[Run], float]
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the results: rows for each explorer at table and ghost, their comparison, numbers of outcomes, detectors, claims.
+    """Return the results as a dict of tables and the judged claims under "claims".
 
-    If not every explorer was run in full at both, the claims have no numbers.
+    "conditions": a row for each explorer at the table and at its ghost, which exerts no force.  "tries at the table over those at the
+    ghost": how these ratios agree between the arms, and which goals they favour.  "number of actions by number of outcomes": histograms.
+    "precision of finding actions that depend on other parts": the result of `detector`.  If not every explorer was run in full at both, all
+    claims stay unmeasured and are not judged.
     """
     forces = runs_of(found)
     tree = forces.get(PROPAGATIONS[0], {})
@@ -170,8 +173,9 @@ def _histogram(runs: Sequence[Run]) -> dict[str, float]:
 def detector(runs: Runs) -> dict[str, dict[str, float]]:
     """Return how well a high number of tries indicates that an action depends on other parts, by "learner, explorer".
 
-    Each value has the precisions of two detectors, "tries" and "beside_ghost" (tries over those at the ghost).  A detector names as many
-    actions as really depend on other parts, so that its precision and recall are equal.  "chance" is the precision of a random choice.
+    A detector names the actions with the highest scores, as many as really depend on other parts, so that its precision and recall are
+    equal.  Each value is a dict: "tries", the precision if the score is the number of tries; "beside_ghost", if it is the number of tries
+    over that at the ghost of the table; "chance", the precision of a random choice.
     """
     table: dict[str, dict[str, float]] = {}
     for learner, explorer in product(LEARNERS, EXPLORERS):
@@ -335,9 +339,12 @@ STYLES = {"table": "-", "ghost": ":"}
 
 
 def plot(found: Cells) -> Any:
-    """Draw the tries of the three learners as in paper fig. 10; contact, agreement of the arms, cycles, outcomes and the detector.
+    """Draw how the three learners explore at the table and at its ghost, which exerts no force, in a figure of nine panels.
 
-    Returns a matplotlib figure.  Raises InvalidValue if no seed has runs of the curious agents both at the table and at the ghost.
+    The panels show the tries of the three learners as in paper fig. 10; how often the torso leans forward; contact with the table over
+    time; the agreement of both arms; cycles of contact; the numbers of outcomes of the actions; and how well tries detect actions that
+    depend on other parts.  Returns a matplotlib figure.  Raises InvalidValue if no seed has runs of the curious agents both at the table
+    and at the ghost.
     """
     runs = runs_of(found).get(PROPAGATIONS[0], {})
     pairs = with_ghosts(runs, "curious")

@@ -196,7 +196,10 @@ class Run:
 
     @property
     def torso_forward(self) -> float:
-        """How often the torso leans forward, in the second half: mean tries of these actions over those of its other actions."""
+        """How often the torso leans forward, in the second half of the run.
+
+        This is the mean number of tries of its actions with a goal state that leans forward, divided by that of its other actions.
+        """
         tries, goals = self.late_tries["torso"], spaces()["torso"].goals
         forward = (goals >= FORWARD_STATES.start) & (goals < FORWARD_STATES.stop)
         return float(tries[forward].mean() / tries[~forward].mean())
@@ -211,9 +214,10 @@ class Run:
 
     @property
     def arms_low(self) -> float:
-        """How often the arms aim low, in the second half: mean tries of actions with a low goal over those of their other actions.
+        """How often the arms aim low, in the second half of the run.
 
-        A goal is low if it is below the table's top when the torso is bent forward.
+        This is the mean number of tries of their actions with a low goal, divided by that of their other actions.  A goal is low if it is
+        below the table's top when the torso is bent forward.
         """
         tries = np.sum([self.late_tries[arm] for arm in ARMS], axis=0)
         aims_low = low()[spaces()[ARMS[0]].goals]
@@ -259,13 +263,16 @@ def runs_of(found: Cells) -> dict[str, Runs]:
 
 
 def with_ghosts(runs: Runs, explorer: str) -> list[tuple[Run, Run]]:
-    """Return pairs of runs of an explorer with the same seed: one at the table, and one at the ghost."""
+    """Return pairs of runs of an explorer with the same seed: one at the table, and one at its ghost, which exerts no force."""
     ghosts = {run.seed: run for run in runs.get((explorer, "ghost"), [])}
     return [(run, ghosts[run.seed]) for run in runs.get((explorer, "table"), []) if run.seed in ghosts]
 
 
 def log_ratios(run: Run, ghost: Run, part: str) -> Array:
-    """Return the logarithm of (tries at the table + 1) / (tries at the ghost + 1) of each action of a part, (S, A)."""
+    """Return the logarithm of (tries at the table + 1) / (tries at the ghost + 1) of each action of a part, (S, A).
+
+    `run`: at the table.  `ghost`: the run of the same seed at the table's ghost, which exerts no force.
+    """
     ratios: Array = np.log((run.tries[part] + 1.0) / (ghost.tries[part] + 1.0))
     return ratios
 
@@ -286,7 +293,7 @@ def by_goal(ratios: Array) -> Array:
 
 
 def agreement(pair: Array) -> float:
-    """Return the rank correlation between the numbers of the left and of the right arm; `pair`: (2, ...)."""
+    """Return the Spearman rank correlation, -1 to 1, between the numbers of the left arm, `pair[0]`, and of the right arm, `pair[1]`."""
     from scipy.stats import spearmanr  # a second
 
     return float(spearmanr(pair[0].ravel(), pair[1].ravel()).statistic)
@@ -318,10 +325,10 @@ def correlations(runs: Sequence[Run]) -> Array:
 
 
 def second_peak(curves: Array) -> int:
-    """Return the lag [windows] of the second peak of an autocorrelation: where the mean of `curves` (runs, lags) is largest.
+    """Return the lag, in windows, of the second peak of an autocorrelation; the first peak is the one at the lag 0.
 
-    Only lags of at least 3 windows count and, if the mean becomes negative there, only lags from this one on: nearer to 0 is the first
-    peak.
+    This is the lag at which the mean of `curves` (runs, lags) is largest, among the lags from 3 windows on.  If the mean is negative
+    somewhere from there on, only lags from the first negative value on are considered, because nearer ones belong to the first peak.
     """
     mean = curves.mean(axis=0)
     fallen = np.flatnonzero(mean[BOUT + 1 :] < 0.0)
@@ -332,7 +339,7 @@ def second_peak(curves: Array) -> int:
 def at_second_peak(ours: Array, theirs: Array) -> tuple[list[float], list[float]]:
     """Return the autocorrelation of each run, and of its ghost, at the lag that is the second peak of all other runs.
 
-    `ours`, `theirs`: (runs, lags), at the table and at the ghost; at least two runs.
+    `ours`, `theirs`: autocorrelations (runs, lags) at the table and at its ghost, which exerts no force; at least two runs.
     """
     lags = [second_peak(np.delete(ours, run, axis=0)) for run in range(len(ours))]
     here, there = ([float(curve[lag]) for curve, lag in zip(curves, lags, strict=True)] for curves in (ours, theirs))
@@ -342,8 +349,9 @@ def at_second_peak(ours: Array, theirs: Array) -> tuple[list[float], list[float]
 def is_cyclic(ours: Array, theirs: Array) -> bool | None:
     """Return whether contact is cyclic: whether the autocorrelation has a second peak, above 0 and above that at the ghost.
 
-    `ours`, `theirs`: autocorrelations (runs, lags) at the table and at the ghost; at least two runs, whose intervals decide.  Without such
-    a peak: None if at lags beyond the bouts the largest values of single runs are above those at the ghost, else False.
+    `ours`, `theirs`: autocorrelations (runs, lags) at the table and at the ghost; at least two runs.  True if the interval of the runs'
+    values at the second peak is above 0 and above that at the ghost.  Otherwise None (undecided) if single runs have larger highest values
+    than at the ghost, at lags from 3 windows on, and False if they have not.
     """
     here, there = at_second_peak(ours, theirs)
     if interval(here)[0] > max(0.0, interval(there)[1]):
@@ -362,7 +370,8 @@ SCORES: dict[str, Callable[[Run, Run, str], Array]] = {
 class Judged:
     """The actions of a learner in one run, sorted by a score, the highest first: which of them depend on other parts.
 
-    `hits`: (parts, actions).  The properties are means over the parts, because the two arms of a run are not independent runs.
+    `hits`: (parts, actions) bool, whether the action at this rank depends on other parts.  The properties are means over the parts, because
+    the two arms of a run are not independent runs.
     """
 
     hits: NDArray[np.bool_]
@@ -391,10 +400,10 @@ class Judged:
 
 
 def dependent(runs: Runs, parts: Sequence[str], but: int) -> NDArray[np.bool_]:
-    """Return which actions (S, A) of these parts depend on other parts: their outcomes differ between table and ghost.
+    """Return which actions (S, A) of these parts depend on other parts: their outcomes differ at the table and at its ghost.
 
-    They differ if the total variation is more than 0.1.  The outcomes are counted in the runs of all explorers and of all seeds except
-    `but`.  `parts`: parts with the same graph, counted together.
+    The ghost exerts no force.  Outcomes differ if their total variation is more than 0.1.  The outcomes are counted in the runs of all
+    explorers and of all seeds except `but`.  `parts`: parts with the same graph, counted together.
     """
     shares = []
     for world in ("table", "ghost"):

@@ -82,8 +82,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
     """Return the settings of the runs: the tasks "coverage" and "return" with every explorer in every world.
 
-    With --tune there is only "return", with other seeds, and with three numbers for each explorer (weight, bonus, or the like).  With
-    --quick there are only the two smallest worlds.
+    With --tune there is only "return", with other seeds, and each explorer has three values of its parameter, such as the weight of the
+    reward or of the bonus.  With --quick there are only the two smallest worlds.
     """
     worlds = ["RiverSwim-6", "DeepSea-10"] if arguments.quick else list(WORLDS)
     if arguments.tune:
@@ -212,16 +212,16 @@ def _dense(model: Any) -> Array:
 
 
 def groups(found: Cells, task: str) -> dict[tuple[str, str, float], Runs]:
-    """Group the values of the finished runs of a task, "coverage" or "return", by (world, explorer, number of the explorer)."""
+    """Group the values of the finished runs of a task, "coverage" or "return", by (world, explorer, value of the explorer's parameter)."""
     every = grouped_by(found, "task", "world", "explorer", "number")
     return {key[1:]: runs for key, runs in every.items() if key[0] == task}
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the results: "runs" has a row for each task, world and explorer.
+    """Return the results as a dict with the keys "runs" and "mean_share_of_the_best_return".
 
-    "mean_share_of_the_best_return" has for each explorer, with its number, the mean over the worlds of its share of the best policy's
-    reward.
+    "runs" has a row for each task, world and explorer.  "mean_share_of_the_best_return" has for each explorer and value of its parameter
+    its reward as a share of the best policy's reward, as a mean over the worlds.
     """
     rows: dict[str, Any] = {}
     for (world, explorer, _), runs in groups(found, "coverage").items():

@@ -93,8 +93,8 @@ def _numbered(contacts: list[SelfContact | None]) -> tuple[list[str], NDArray[np
 class SelfContact:
     """The deepest overlap of two fields during an action: the names of both links, and the depth [m]."""
 
-    pair: tuple[str, str]  # links
-    depth: float  # m
+    pair: tuple[str, str]
+    depth: float
 
 
 class SelfContactPlant(WrappedPlant[OfflinePlant]):
@@ -200,9 +200,11 @@ def runs_of(found: Cells) -> Runs:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the results: rows of both lattices, unreached states, ends of deflected actions, self-contacts, and the claims.
+    """Return the results as a dict of tables by lattice ("small", "stretched"), and the judged claims under "claims".
 
-    If not both lattices were run in full, the claims have no numbers.
+    "lattices": a row of numbers.  "states never reached": in which share of the runs.  "end states of deflected actions, times per run": by
+    action of the small lattice.  "self-contacts": the result of `contacts_by_pair`.  If not both lattices were run in full, all claims stay
+    unmeasured and are not judged.
     """
     runs = runs_of(found)
     whole = all(lattice in runs and len(runs[lattice][0].seen) == actions for lattice, actions in ACTIONS.items())

@@ -113,7 +113,9 @@ def findings(found: Cells) -> dict[str, Any]:
 def means(groups: Groups, law: str, scene: str, method: str, measure: str) -> Array:
     """Return the mean of a measure over the cases, for each seed, (seeds,).
 
-    `measure`: one of `trial`, or "success", the share of cases with the palm within 2 cm of the target's surface.
+    `groups`: results of `trial` by law.  `law`, `scene`, `method`: which runs and cases are used.  `measure`: "missing", distance of the
+    palm from the target's surface [m]; "seconds", plant time; "reward" (thesis eq. 8.4); or "success", the share of cases with the palm
+    within 2 cm of the target's surface.
     """
     name = "missing" if measure == "success" else measure
     each = [values[f"{scene}|{method}|{name}"] for values in groups[law]]

@@ -83,9 +83,10 @@ SHOWN = "both"  # the roadmaps' model in the curves
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return the settings of the runs: straight motions, the MDP after 0 to 4000 transitions, and roadmaps of each wrong model.
+    """Return the settings of the runs: straight motions, the MDP after 0, 1000 and 4000 transitions, and roadmaps with each model.
 
-    With --quick there are 20 queries instead of 60.
+    The models of the roadmaps' planners have no errors, or one of four kinds of errors, as in `believed`.  With --quick there are 20
+    queries instead of 60.
     """
     shared = {"queries": 20 if arguments.quick else QUERIES}
     learned = [Condition(f"mdp-{n}", {**shared, "learned": n}, 1.0 + n / 1000) for n in LEARNED]
@@ -139,12 +140,12 @@ class Scene:
     angles.  `starts`: (Q, 4) rad.  `goals`: (Q,) goal states.  `is_hard`: (Q,), whether the straight motion failed when it was tried.
     """
 
-    balls: Array  # (B, 3) m
-    shifts: Array  # (B, 3) m, believed minus true positions
-    turns: Array  # (4,) rad, believed minus true joint angles
-    starts: Array  # (Q, 4) rad
-    goals: Ints  # (Q,)
-    is_hard: NDArray[np.bool_]  # (Q,): the straight motion failed when it was tried
+    balls: Array
+    shifts: Array
+    turns: Array
+    starts: Array
+    goals: Ints
+    is_hard: NDArray[np.bool_]
 
 
 def space() -> Lattice:
@@ -161,7 +162,10 @@ def world_of(balls: Array) -> World:
 
 
 def plant_of(scene: Scene, seed: int, start: Array) -> OfflinePlant:
-    """Return an offline plant of the left arm among the true balls of a scene, at rest in the pose `start` (4,) rad."""
+    """Return an offline plant of the left arm, at rest in the pose `start` (4,) rad, with the balls of a scene at their true positions.
+
+    The model of a planner may have the balls at wrong positions.  `seed`: seed of the plant's random numbers.
+    """
     plant = arm_plant(seed, world=world_of(scene.balls))
     place(plant, whole(start[None])[0])
     return plant
@@ -249,14 +253,18 @@ class Answers:
     of actions, and of actions that did not end as planned.
     """
 
-    success: NDArray[np.bool_]  # (Q,)
-    seconds: Array  # (Q,) plant time, QUERY_TIMEOUT for queries that failed
-    actions: Ints  # (Q,)
-    repairs: Ints  # (Q,)
+    success: NDArray[np.bool_]
+    seconds: Array
+    actions: Ints
+    repairs: Ints
 
 
 def answer(scene: Scene, rival: Rival, seed: int) -> Answers:
-    """Let a planner answer all queries of a scene in their order; the noise of a query is the same for all planners."""
+    """Let a planner answer all queries of a scene in their order, and return its results.
+
+    `seed`: with the number of a query, the seed of the plant's noise; so the noise of a query is the same for all planners.  A query ends
+    in the goal's cell, after 120 s of plant time, or when the planner gives up.
+    """
     lattice = space()
     rows = []
     for number, goal in enumerate(scene.goals):

@@ -85,7 +85,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
     """Return the settings of the runs: three strategies with every unit of distances (option --scales).
 
-    With --quick only the first unit is used, and there are 400 problem-tries.
+    The unit is that of the distance in the reward of a reach, thesis eq. 8.4.  With --quick only the first unit is used, and there are 400
+    problem-tries (attempts to reach one target).
     """
     shared = {"law": arguments.law, "checkpoints": list(CHECKPOINTS[:3] if arguments.quick else CHECKPOINTS)}
     first, *others = arguments.scales[:1] if arguments.quick else arguments.scales
@@ -101,7 +102,10 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Learn the outcomes of actions, and then to reach for the 27 targets with one strategy.
 
-    Returns the arrays of `experiments.kit.reaching.learning.learn`, with evaluations under the name "grid".
+    Returns arrays by name.  For the T attempts to reach one target (problem-tries): `problem`, `reach_state`, `reward`, `actions`,
+    `duration` [s], each (T,); `failures` (S, A), failures of each transition.  For L evaluations of R repetitions: `rewards_grid` and
+    `states_grid` (L, R, 27), and `blocked_grid` (L,), failed transitions.  The names are those of
+    `experiments.kit.reaching.learning.learn`.
     """
     plant = reach_plant(seed, settings["law"])
     beliefs = learned_beliefs(plant, seed)

@@ -93,10 +93,11 @@ def episodes(agent: ReachAgent, plant: OfflinePlant, count: int, seed: int) -> l
 
 
 def selected(paths: Sequence[Array]) -> dict[str, int]:
-    """Return the index of the clearest example of each kind of path, among paths (T, 3) m of the hand.
+    """Return the indices of the clearest examples among paths (T, 3) m of the hand, by kind of path.
 
-    The kinds are "From above", "Far" and "Around the target".  No path is chosen for two kinds, and none shorter than 15 cm, so that kinds
-    may be absent.
+    The kinds are "From above", "Far" and "Around the target".  The clearest example has the steepest descent at its end, the largest
+    distance between its ends, or the largest detour.  No path is chosen for two kinds, and none shorter than 15 cm, so that kinds may be
+    absent.
     """
     left = [number for number, path in enumerate(paths) if _length(path) >= MIN_LENGTH]
     chosen: dict[str, int] = {}

@@ -75,7 +75,7 @@ def places(quick: bool) -> dict[str, Array]:
 
 
 def truths(arguments: argparse.Namespace) -> list[Cell]:
-    """Return the cells that measure the true rewards and blocked transitions, one for each target."""
+    """Return the cells (single runs) that measure the true rewards and blocked transitions, one for each target."""
     settings: dict[str, Any] = {"what": TRUTH, "law": arguments.law, "tries": 1 if arguments.quick else TRIES}
     named = {name: found.tolist() for name, found in places(arguments.quick).items()}
     return [
@@ -86,9 +86,9 @@ def truths(arguments: argparse.Namespace) -> list[Cell]:
 
 
 def cells(arguments: argparse.Namespace) -> list[Cell]:
-    """Return the cells of the oracle and of every learner with every seed.
+    """Return the cells (runs) of every learner and of the oracle, an agent that knows all true rewards, with every seed.
 
-    With --quick there are 200 problem-tries instead of 1600.
+    With --quick there are 200 problem-tries (attempts to reach one target) instead of 1600.
     """
     settings: dict[str, Any] = {"law": arguments.law, "scale": arguments.scale, "quick": arguments.quick}
     seeds = range(arguments.seed, arguments.seed + arguments.seeds)
@@ -104,7 +104,8 @@ def cells(arguments: argparse.Namespace) -> list[Cell]:
 def measure_truth(cell: Cell) -> dict[str, Any]:
     """Measure the remaining errors of reaches from all states for the target of a cell, and the transitions that it blocks.
 
-    Returns the values of `experiments.kit.reaching.truth.Tried`.
+    Returns `missing` (S, n) m, remaining errors of n tries to reach from each state, NaN for tries that were not made; and `made` and
+    `failed` (S, A), the number of tries of each transition, and of those that did not end in its goal.
     """
     settings = cell.settings
     return measure(np.array(settings["place"]), settings["law"], settings["tries"]).values()
@@ -113,8 +114,9 @@ def measure_truth(cell: Cell) -> dict[str, Any]:
 def trial(truth: Truth, cell: Cell) -> dict[str, Any]:
     """Run one learner, or the oracle with the measured `truth`, and evaluate it on both sets of targets.
 
-    Returns the arrays of `experiments.kit.reaching.learning.learn`, with evaluations under the names "grid", targets that are tried, and
-    "between", targets that never are.  The oracle has the arrays of the evaluations alone.
+    The oracle is an agent that knows the true rewards and the blocked transitions.  The sets are "grid", targets that are tried, and
+    "between", targets that never are.  Returns, for L evaluations of R repetitions of P targets, `rewards_SET` and `states_SET` (L, R, P)
+    and `blocked_SET` (L,), failed transitions; for a learner also the arrays of its tries, as in `experiments.kit.reaching.learning.learn`.
     """
     settings, space = cell.settings, reach_space()
     plant, aim = reach_plant(cell.seed, settings["law"]), laws()[settings["law"]].aim

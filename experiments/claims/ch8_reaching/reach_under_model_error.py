@@ -109,8 +109,9 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Let one contestant learn, and evaluate it after each number of tries in the setting `tries`.
 
-    Returns `rows`, one for each evaluation, with the fields of `Score` and `hours`, the plant time so far; and the number of `targets`.
-    For a planner also `planning`, the processor time of each try [s], and `remembered`, the number of poses in its memory.
+    Returns `rows`, a dict for each evaluation: `fates`, `seconds` and `actions` as in `Score`, and `hours`, the plant time so far; and the
+    number of `targets`.  For a planner also `planning`, the processor time of each try [s], and `remembered`, the number of poses in its
+    memory.
     """
     contestant = settings["contestant"]
     scene = make_scene(seed, settings["wrong"])

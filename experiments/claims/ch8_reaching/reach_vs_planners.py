@@ -91,7 +91,8 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Let learner and planner attempt the same cases of the right arm, or plan paths of both arms.
 
     For the cases, returns arrays (cases,) with keys "scene|contestant|measure"; the measures are "success", "missing" [m], "seconds" (plant
-    time) and "thinking" (processor time for plans, s).  For both arms, returns the fields of `PlannedQuery`, (queries,) each.
+    time) and "thinking" (processor time for plans, s).  For both arms, returns arrays (queries,): "found", "seconds", "smoothing",
+    "corners" and "missing", as in `PlannedQuery`.
     """
     if settings["scene"] == "two arms":
         queries = [plan_both_arms(1000 * seed + number) for number in range(settings["queries"])]

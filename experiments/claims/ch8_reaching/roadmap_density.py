@@ -74,10 +74,10 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Put a cup beside the path of each query, and move around it after bumps, with both modes of removing edges.
 
-    Returns the number of `vertices` and `edges` of the roadmap; `invalid` (queries,), edges that are blocked; arrays (queries,) with keys
-    "mode|measure", of the modes "edge" and "around" of `walked` and the measures `arrived`, `bumps`, `edges` and `seconds` of a `Walk`; and
-    for the path executed in the first query `off`, the palm's error at its end, and `solid`, the deepest contact of solids, m (NaN: nothing
-    was executed).
+    Returns the numbers of `vertices` and `edges` of the roadmap; `invalid` (queries,), the number of edges that the cup blocks; and arrays
+    (queries,) with keys "mode|measure".  The modes are "edge" and "around", as in `walked`; the measures "arrived", "bumps", "edges" and
+    "seconds", as in `Walk`.  The path around the cup is executed in the first query: `off` is the palm's error at its end, `solid` the
+    depth of the deepest contact of solids, both in m; NaN if there is no such path.
     """
     roadmap = built(settings["spacing"])
     found: dict[str, Any] = {"vertices": len(roadmap.q), "edges": len(roadmap.edges)}
@@ -210,9 +210,10 @@ def _is_free(path: list[int], blocked: frozenset[Edge]) -> bool:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the results: "roadmaps" has a row for each spacing and mode, "executed" the executed paths, "claims" the claims.
+    """Return the results as a dict with three keys, "roadmaps", "executed" and "claims".
 
-    With runs of one spacing only, the claims have no numbers.
+    "roadmaps" has a row for each spacing and mode of removing edges, "executed" the measures of the executed paths, "claims" the claims
+    with their measured values and verdicts.  With runs of one spacing only, all claims stay unmeasured and are not judged.
     """
     groups = grouped(found, "spacing", SPACINGS)
     rows = [
@@ -228,7 +229,8 @@ def findings(found: Cells) -> dict[str, Any]:
 def numbers(runs: list[dict[str, Any]], mode: str, name: str) -> Array:
     """Return the mean of a measure over the queries of each run, (runs,).
 
-    `mode`: "edge" or "around", as in `walked`.  `name`: "arrived", "bumps", "edges" or "seconds", as in `Walk`.
+    `mode`: "edge": a bump removes its edge; "around": it removes all edges around its place.  `name`: "arrived", whether the goal was
+    reached; "bumps", number of bumps; "edges", number of edges begun; or "seconds", duration of the motion.
     """
     return np.array([float(np.mean(values[f"{mode}|{name}"])) for values in runs])
 

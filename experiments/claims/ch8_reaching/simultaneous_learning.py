@@ -80,7 +80,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
     """Return the settings of the runs: the walks that measure the true outcomes, and the five variants of learning.
 
-    With --quick the runs have 2000 instead of 4000 actions.
+    Transitions and reaches are learned at the same time, and failures are attributed by contact, always to the model, or always to the
+    target; or 3000 or 1000 transitions are learned first.  With --quick the runs have 2000 instead of 4000 actions.
     """
     checkpoints = list(QUICK if arguments.quick else CHECKPOINTS)
     variants = [Condition(variant, {"variant": variant, "learner": arguments.learner, "checkpoints": checkpoints}) for variant in VARIANTS]
@@ -230,7 +231,7 @@ def actions_to(least: float, actions: Ints, scores: Array) -> Array:
 
 
 def no_more(ours: Array, theirs: Array) -> bool | None:
-    """Return whether our runs need at most as many actions as the runs of the same seeds that they are compared with.
+    """Return whether our runs need at most as many actions as other runs of the same seeds.
 
     `ours`, `theirs`: numbers of actions, (N,).  None if the interval of the differences leaves this open, or if a run never reached the
     score, so that its number is inf.
@@ -241,9 +242,10 @@ def no_more(ours: Array, theirs: Array) -> bool | None:
 
 
 def level(ours: Array, theirs: Sequence[Array]) -> bool | None:
-    """Return whether our scores (N,) are at most 5 % below each of their scores (N,), of the same seeds.
+    """Return whether our scores are at most 5 % below those of all other variants, by the intervals of the differences.
 
-    False if ours are farther below one of them, None if the intervals leave this open.
+    `ours`: scores (N,) of N seeds.  `theirs`: scores (N,) of the same seeds, for each other variant.  False if ours are farther below one
+    of them, None if the intervals leave this open.
     """
     return all_hold(decides(interval(ours - other), least=-MARGIN * float(other.mean())) for other in theirs)
 

@@ -27,18 +27,20 @@ class Comparison:
     """Differences between this library's reading of a file and that by the rules of 2014; the counts are 0 where they agree.
 
     `poses`: number of compared poses.  `position_error`: largest distance between the positions of a volume's centre or a marker [m].
-    `rotation_error`: largest difference of a direction.  Counts of differences: `pairs`, tested pairs of volumes; `base`, volumes that are
-    tested against the world; `clauses`, clauses that hold; `contacts`, contacts.  `all_contacts`: number of all contacts.
+    `rotation_error`: largest difference of a component of a direction: normals of markers, height axes and faces of volumes.  Counts of
+    differences: `pairs`, pairs of volumes that only one reading tests; `base`, volumes that only one reading tests against the world;
+    `clauses`, clauses (constraints on several joints) that hold in a pose by one reading only; `contacts`, contacts that only one reading
+    finds.  `all_contacts`: number of all contacts, in all poses.
     """
 
     poses: int
-    position_error: float  # m, largest distance between the centres of a volume, or the positions of a marker
-    rotation_error: float  # largest difference of a direction: normals of markers, height axes and faces of volumes
-    pairs: int  # of volumes that one side tests and the other does not
-    base: int  # volumes that only one side tests against the world
-    clauses: int  # answers that differ
-    contacts: int  # contacts that only one side finds
-    all_contacts: int  # all contacts
+    position_error: float
+    rotation_error: float
+    pairs: int
+    base: int
+    clauses: int
+    contacts: int
+    all_contacts: int
 
     @property
     def agrees(self) -> bool:

@@ -62,9 +62,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Load every file, compare each robot with the result of `program_2014`, which follows that program's source, and write the table.
+    """Load every file, compare each robot with its reading by the rules of the program of 2014, and write the table.
 
-    Files that the records in `folder` contain already are skipped.  Returns the results.
+    `program_2014` reads a file by these rules, which follow the program's source.  Files that the records in `folder` contain already are
+    skipped.  Returns the results.  Raises InvalidValue if no file is found.
     """
     originals = [one for one in find_originals(arguments.checkouts) if arguments.only in one.name]
     if not originals:
@@ -83,7 +84,12 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 def results(folder: Path) -> dict[str, Any]:
-    """Write the table of the run in `folder`, and return the numbers of files that load and agree, and "passed"."""
+    """Write the table of the run in `folder`, and return the counts of its files.
+
+    Keys: "files", "robots" and "load", numbers of files; "share", of files that load; "compared" and "agree", numbers of robots that were
+    compared, and whose readings agree; "poses" and "contacts", compared in all; "table", path of the table; "passed", whether at least 95 %
+    of the files load and all compared robots agree.
+    """
     rows = read_records(folder / RECORDS, COLUMNS)
     write_table(rows, folder / TABLE)
     loaded = [row for row in rows if row["loads"] == "yes"]

@@ -95,7 +95,12 @@ def failures(one: Measured) -> list[str]:
 
 
 def results(folder: Path) -> dict[str, Any]:
-    """Return the worst value of each measurement over all robots of the run in `folder`, the robots that fail, and "passed"."""
+    """Return the worst value of each measurement over all robots of the run in `folder`, the robots that fail, and "passed".
+
+    "failed": dict from the name of a robot to the parts of the claim that it does not meet, as in `failures`.  "refused": dict from the
+    name of a robot that could not be read to the reason.  "touch themselves at home" and "and with the SRDF": numbers of robots.  The worst
+    values are None without robots.  "passed": whether no robot failed or was refused, None without robots.
+    """
     found, refused = read(folder), read_records(folder / REFUSED, ("robot", "why"))
     failed = {one.robot: failures(one) for one in found if failures(one)}
     return {
@@ -140,11 +145,13 @@ def table(found: Sequence[Measured]) -> list[str]:
 class Measured(Row):
     """The measurements of one robot; -1 where there is nothing to measure.
 
-    `motors`, `slides` and `shapes`: numbers of motors, of prismatic ones, and of shapes.  `touching`: solid contacts at home.  `written`:
-    pairs written to an SRDF; `touching_after`: contacts then; `srdf_s`: time to write [s].  `drift_deg`, `drift_mm`: largest distance of
-    revolute and prismatic motors from home, while home is the attractor for 10 s.  `slide_mm`: worst error of a prismatic joint;
-    `unsettled`: actions of prismatic joints that timed out.  `actions_s`: time from the file to the end of 250 curious actions [s];
-    `solid`: how many of them ended with solids in contact.  `field_...`: the same with fields of 3 cm.
+    `motors`, `slides` and `shapes`: numbers of motors, of prismatic motors, and of shapes.  `touching`: solid contacts at home before an
+    SRDF is written.  `written`: number of pairs written to the SRDF, a file that lists pairs not to be tested; `touching_after`: contacts
+    with it; `srdf_s`: time to write it [s].  `drift_deg`, `drift_mm`: largest distance of revolute and prismatic motors from home, while
+    home is the attractor for 10 s.  `slide_mm`: worst error of a prismatic joint over its range; `unsettled`: number of actions of
+    prismatic joints that timed out.  `actions_s`: time from the file to the end of 250 curious actions [s]; `solid`: how many of these
+    actions ended with solids in contact.  `field_drift_deg`, `field_actions_s`, `field_solid`: the same as the names without "field_", for
+    the robot with fields (volumes that are not solid) of 3 cm.
     """
 
     PLACES = 4
@@ -153,17 +160,17 @@ class Measured(Row):
     motors: int
     slides: int
     shapes: int
-    touching: int  # solid contacts at home
-    written: int  # pairs written to the SRDF
+    touching: int
+    written: int
     touching_after: int
     srdf_s: float
     drift_deg: float
     drift_mm: float
     slide_mm: float  # the worst error of a prismatic joint over RANGE_SHARES
-    unsettled: int  # actions of prismatic joints that ended by timeout
-    actions_s: float  # from the file to the end of ACTIONS curious actions
-    solid: int  # of these actions, the number that ended with solids in contact
-    field_drift_deg: float  # the same with fields of FIELD_SIZE
+    unsettled: int
+    actions_s: float
+    solid: int
+    field_drift_deg: float
     field_actions_s: float
     field_solid: int
 

@@ -57,20 +57,21 @@ class Node:
 
 @dataclass
 class Program:
-    """The contents of a robot file as the program of 2014 reads them.
+    """The contents of a robot file as the MoBeE program of 2014 (kailfrank/MoBeE) read them.
 
-    `nodes`: parents before children.  `motors`: lower limit, upper limit and home [deg], by name.  `markers`: name, node and normal (3,) of
-    each.  `clauses`: each a list of rows; a row has motor names, their factors and an offset.
+    `nodes`: parents before children.  `motors`: dict from a name to lower limit, upper limit and home [deg].  `markers`: name, node and
+    normal (3,) of each.  `clauses`: constraints on several joints, each a list of rows, of which at least one must hold; a row has the
+    names of motors, their factors and an offset.
     """
 
     nodes: list[Node] = field(default_factory=list)
-    motors: dict[str, tuple[float, float, float]] = field(default_factory=dict)  # low, high, home
-    markers: list[tuple[str, Node, Array]] = field(default_factory=list)  # name, node, normal
+    motors: dict[str, tuple[float, float, float]] = field(default_factory=dict)
+    markers: list[tuple[str, Node, Array]] = field(default_factory=list)
     clauses: list[list[tuple[list[str], list[float], float]]] = field(default_factory=list)
 
     @classmethod
     def read(cls, path: Path) -> Program:
-        """Read a robot file by the rules of 2014."""
+        """Read a robot file by the rules of the MoBeE program of 2014."""
         program, root = cls(), ET.fromstring(_first_attributes(path.read_text(encoding="utf-8", errors="replace")))
         program._walk(root, None, "", "", None)
         program._read_clauses(root)

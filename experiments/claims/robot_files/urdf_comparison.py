@@ -33,35 +33,38 @@ EMPTY_SRDF = '<robot name="none"/>\n'
 class FileRecord(Row):
     """The results of one URDF file; measurements that are missing are nan, counts -1.
 
-    `outcome`: "loads", "thing" (no robot), "refused" or "crash".  `message`: why it was refused, crashed or not compared.  `links`: number
-    of links with compared frames.  `srdf`: name of the SRDF that was found; `home`: name of the pose in it.  `seconds`: time to load.
-    `frame_error`: largest difference of an element of a link's frame from Pinocchio's.  `contacts`: pairs of links that touch in all poses,
-    by coal; `other`: pairs that touch for one of the two programs only; `deepest_other`: the deepest of these [m].  `at_home`: solid
-    contacts at home; `at_home_without`: the same without an SRDF.
+    `outcome`: "loads", "thing" (no joint moves, so it is no robot), "refused" or "crash".  `message`: why it was refused, crashed or not
+    compared.  `links`: number of links whose frames were compared.  `srdf`: name of the SRDF that was found; `home`: name of the pose in
+    it.  `seconds`: time to load, with default options.  `frame_error`: largest difference of an element of a link's frame from Pinocchio's
+    [m or 1].  `contacts`: pairs of links that touch in all poses, by the collision library coal; `other`: pairs that touch, by more than
+    1e-6 m, by coal or by this library only; `deepest_other`: depth of the deepest of these [m].  `at_home`: solid contacts at home, with
+    default options; `at_home_without`: the same without an SRDF.
     """
 
     PLACES = None  # frames differ by 1e-16
 
     name: str
-    outcome: str  # "loads", "thing" (no robot), "refused" or "crash"
-    message: str = ""  # of a refusal or crash, or why a comparison was not made
+    outcome: str
+    message: str = ""
     motors: int = -1
-    links: int = -1  # whose frames were compared
-    srdf: str = ""  # name of the file that was found
-    home: str = ""  # name of the pose in it
-    seconds: float = np.nan  # to load, with default options
-    frame_error: float = np.nan  # m and 1: greatest difference of a number of a link's frame from Pinocchio's
-    contacts: int = -1  # pairs of links that touch in the poses, by coal
-    other: int = -1  # pairs that touch for one of the two only
-    deepest_other: float = np.nan  # m
-    at_home: int = -1  # solid contacts, with default options
-    at_home_without: int = -1  # the same without an SRDF
+    links: int = -1
+    srdf: str = ""
+    home: str = ""
+    seconds: float = np.nan
+    frame_error: float = np.nan
+    contacts: int = -1
+    other: int = -1
+    deepest_other: float = np.nan
+    at_home: int = -1
+    at_home_without: int = -1
 
 
 def compare_file(name: str, path: Path, poses: int, seed: int, scratch: Path) -> FileRecord:
-    """Load a URDF file with default options and with exact hulls, and compare it with Pinocchio and coal in random poses.
+    """Load a URDF file, compare it with Pinocchio (frames) and coal (contacts) in random poses, and return the record.
 
-    `name`: of the file, for the record.  `scratch`: a folder, where an empty SRDF is written.
+    The contacts are compared with exact convex hulls of the meshes, all else with default options.  `name`: of the file, for the record.
+    `poses`: number of random poses.  `scratch`: a folder, where an empty SRDF is written.  Any error while the file is loaded is recorded,
+    not raised.
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

@@ -52,26 +52,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 class Measured(Row):
     """The measurements of one robot.
 
-    `arms`: names of the parts that learn.  `joints`: numbers of their joints.  `errors`, `warnings`: findings of `mobee check` about what
-    was derived.  `at_home`: contacts at home, of solids and fields.  `load_s`, `derive_s`: times to load and to derive [s].  `transitions`:
-    while all arms learn.  `depth_mm`: depth of the deepest solid contact; `touching`: the two solids.  Of the single agent: `tried`,
-    state-actions that it has tried; `can_be_tried`, the actions of all states that it has visited; `state_actions`, all.
+    `arms`: names of the parts that learn.  `joints`: numbers of their joints.  `errors`, `warnings`: numbers of findings of `mobee check`
+    about what was derived.  `at_home`: contacts at home, of solids and fields.  `load_s`, `derive_s`: times to load the file and to derive
+    arms, limits and fields from it [s].  `transitions`: number while all arms learn.  `depth_mm`: depth of the deepest solid contact;
+    `touching`: the two solids.  One arm also learns alone: `tried`, state-actions that its agent has tried; `can_be_tried`, the actions of
+    all states that it has visited; `state_actions`, all.
     """
 
     robot: str
     motors: float
-    arms: str  # names of the parts that learn
-    joints: str  # numbers of joints of these
-    errors: float  # findings of `mobee check` about what was derived
+    arms: str
+    joints: str
+    errors: float
     warnings: float
-    at_home: float  # contacts of solids and fields
+    at_home: float
     load_s: float
     derive_s: float
     transitions: float
     depth_mm: float
-    touching: str  # the two solids of the deepest contact
-    tried: float  # state-actions that the single agent has tried
-    can_be_tried: float  # the actions of all states that it has come to
+    touching: str
+    tried: float
+    can_be_tried: float
     state_actions: float
 
 
@@ -207,8 +208,10 @@ def failures(one: Measured) -> list[str]:
 def results(folder: Path) -> dict[str, Any]:
     """Return the results of the run in `folder`.
 
-    Main keys: "robots", their number; "meet the claim"; "cannot", what each other robot cannot do; "refused", why files were refused; "no
-    robots", number of files without a robot; "passed".
+    Main keys: "robots": number of robots that were measured; "meet the claim": number of robots without a failure; "cannot": dict from the
+    name of a robot that does not meet the claim to a text that says what it cannot do; "refused": dict from the name of a file that could
+    not be used to the reason; "no robots": number of files that hold nothing that can learn; "passed": whether all robots meet the claim,
+    None if no robot was measured.
     """
     found, refused = read(folder), read_refused(folder)
     failed = {one.robot: "; ".join(failures(one)) for one in found if failures(one)}

@@ -30,18 +30,18 @@ MARGIN = np.deg2rad(15.0)  # rad along the normal, of a start; constraints push 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Command:
-    """A command for one arm: a start posture and three phases, each with an attractor and with forces of a client.
+    """A command for one arm: a start posture and three phases, each with an attractor and with forces that a client of the robot exerts.
 
-    Positions of the 7 motors are in half ranges from the middle of the range: -1 to 1 is inside the limits.  `seconds`: durations of the
-    phases.  `forces`: at the motors, -1 to 1 in units of STRONG (1000 rad/s^2).  `pushes`: at the palm, root frame, -1 to 1 in units of
-    STRONG (1000 N/kg).
+    `start` (7,) and `attractors` (3, 7): motor positions in half ranges from the middle of the range, so -1 to 1 is inside the limits.
+    `seconds`: (3,), durations of the phases.  `forces`: (3, 7), forces at the motors, -1 to 1 in units of STRONG (1000 rad/s^2).  `pushes`:
+    (3, 3), forces at the palm, root frame, -1 to 1 in units of STRONG (1000 N/kg).
     """
 
-    start: Array  # (7,)
-    attractors: Array  # (3, 7)
-    seconds: Array  # (3,)
-    forces: Array  # (3, 7) at the motors, -1 to 1, in units of STRONG
-    pushes: Array  # (3, 3) at the palm, root frame, in the same unit
+    start: Array
+    attractors: Array
+    seconds: Array
+    forces: Array
+    pushes: Array
 
     @property
     def is_forced(self) -> bool:
@@ -99,7 +99,7 @@ def as_numbers(command: Command) -> list[float]:
 
 
 def from_numbers(numbers: list[float]) -> Command:
-    """Return the command that `as_numbers` returned as these numbers."""
+    """Return the command from the list of numbers that `as_numbers` has made of it."""
     ends = np.cumsum([MOTORS, PHASES * MOTORS, PHASES, PHASES * MOTORS])
     start, attractors, seconds, forces, pushes = np.split(np.array(numbers), ends)
     return Command(start, attractors.reshape(PHASES, -1), seconds, forces.reshape(PHASES, -1), pushes.reshape(PHASES, -1))
@@ -107,21 +107,23 @@ def from_numbers(numbers: list[float]) -> Command:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tried:
-    """Measures of a run in which each arm executed a command; the first row is of the left arm.
+    """Measures of a run in which each arm executed a command; the first row of each array is of the left arm.
 
-    `run`: the recording.  `violations`: (2, clauses of an arm) rad, the largest violation of each clause.  `stop`: (2,) rad/s, the largest
-    speed of a motor at a hard stop.
+    `run`: the recording.  `violations`: (2, C) rad, the largest violation of each of the C clauses of an arm, as `clause_violations`
+    computes it; a clause is a condition on several motor positions, which the cables of the shoulder impose.  `stop`: (2,) rad/s, the
+    largest speed of a motor at a hard stop.
     """
 
     run: PlantRun
-    violations: Array  # (2, clauses of an arm) rad along the normal, the largest of each
-    stop: Array  # (2,) rad/s, the fastest impact at a hard stop
+    violations: Array
+    stop: Array
 
 
 def try_commands(gains: Gains, commands: Sequence[Command], torso: Array, seed: int) -> Tried:
     """Run the iCub at its table with a command for the left arm and one for the right arm, and measure the run.
 
-    `commands`: left, right.  `torso`: (3,) attractor of the torso, in half ranges from the middle of the range.  `seed`: of the plant.
+    `commands`: the command of the left arm, then that of the right arm.  `torso`: (3,), attractor of the torso during the whole run, in
+    half ranges from the middle of the range.  `seed`: seed of the plant's random numbers.
     """
     robot = icub_at_table().robot
     plant = OfflinePlant(icub_at_table(), seed, gains, dt=PERIOD[gains.law])

@@ -24,7 +24,8 @@ AT_STOP = np.deg2rad(0.01)  # rad; a motor nearer to a limit is at its hard stop
 def clause_violations(robot: Robot, q: Array) -> Array:
     """Return the violation of every clause of the robot in postures q (T, n) rad: (T, clauses) rad, above 0 where a clause is violated.
 
-    The violation of a row a.q + b > 0 is -(a.q + b) / |a|; a clause has that of the row that is nearest to being satisfied.
+    A clause is a condition on several motors: at least one of its inequalities a.q + b > 0 (its rows) must hold.  The violation of a row is
+    -(a.q + b) / |a|; the violation of a clause is the smallest violation among its rows.
     """
     return np.stack([np.min(-(q @ c.a.T + c.b) / np.linalg.norm(c.a, axis=1), axis=1) for c in robot.clauses], axis=1)
 
@@ -44,7 +45,10 @@ def speeds_at_stops(robot: Robot, run: PlantRun, start: Array) -> Array:
 
 
 def clause_label(robot: Robot, number: int) -> str:
-    """Return the clause `number` of the robot as text, an inequality in degrees; the prefixes `l_` and `r_` of its motors are left out."""
+    """Return a clause of the robot, a condition on several motor positions, as text: inequalities in degrees.
+
+    `number`: index of the clause in `robot.clauses`.  The prefixes `l_` and `r_` of the motors are left out.
+    """
     rows = []
     for a, b in zip(robot.clauses[number].a, robot.clauses[number].b, strict=True):
         terms = [f"{a[i]:+.3g} {robot.motors[i].split('_', 1)[1]}" for i in np.flatnonzero(a)]
@@ -54,16 +58,17 @@ def clause_label(robot: Robot, number: int) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Depths:
-    """The depths of the deepest contacts of a run, m; 0 where there was no contact.
+    """The depths of the deepest contacts of a run, in m; 0 where there was no contact.
 
-    `solid`: of solid pairs that `is_listed` accepts.  `field`: of fields.  `pair`: names of the shapes of the contact `solid`, "" without
-    one.  `beside`: of all other solid pairs, such as an upper arm beside the pelvis.
+    `solid`: deepest contact between two solids that counts as a collision by `is_listed`.  `field`: deepest contact of fields, which are
+    larger volumes that cause repulsive forces.  `pair`: names of the two solids of the contact `solid`, "" if there was no such contact.
+    `beside`: deepest contact between two solids that does not count as a collision, such as an upper arm beside the pelvis.
     """
 
-    solid: float  # of listed pairs, see `is_listed`
+    solid: float
     field: float
-    pair: str  # the listed solids of the deepest contact, "" without one
-    beside: float  # of solid pairs that are not listed, as an upper arm beside the pelvis
+    pair: str
+    beside: float
 
 
 def deepest(model: Model, q: Array) -> Depths:
@@ -96,10 +101,10 @@ def oscillation(model: Model, run: PlantRun, marker: str) -> float:
 
 @cache
 def is_listed(first: str, second: str) -> bool:
-    """Return whether a solid contact of two shapes, given by name, counts as a collision.
+    """Return whether a contact of two solids counts as a collision; `first`, `second`: names of their shapes.
 
-    It counts if an object of the world takes part, or if the pair of links is in the simulator's list.  Pairs that overlap in some legal
-    poses, such as upper arm and pelvis, are not listed; their fields exert no force either.
+    It counts if an object of the world takes part, or if the pair of links is in the simulator's list of pairs (solid_pairs.json). Pairs
+    that overlap in some legal poses, such as upper arm and pelvis, are not in the list; their fields exert no force either.
     """
     one, other = _link(first), _link(second)
     return one is None or other is None or frozenset((one, other)) in _pairs()

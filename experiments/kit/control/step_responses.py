@@ -57,7 +57,8 @@ def motor_step(motor: int) -> tuple[Array, Array]:
 def postures(count: int, seed: int) -> list[Array]:
     """Draw `count` postures (n,) rad of torso and arms, to be taken one after the other, the first from home.
 
-    On the paths to the first posture and from each one to the next, no field is in contact, and all constraints are 15 degrees away.
+    On the paths to the first posture and from each one to the next, nothing touches, neither solids nor the larger fields around them, and
+    the postures are at least 15 degrees away from every cable constraint.
     """
     robot, rng = icub().robot, np.random.default_rng(seed)
     found = [robot.home]
@@ -77,7 +78,7 @@ def postures(count: int, seed: int) -> list[Array]:
 def run_step(gains: Gains, period_ms: float, start: Array, end: Array, seed: int) -> PlantRun:
     """Run a plant from rest at `start` (n,) rad with the attractor at `end` (n,) rad, and return the recording.
 
-    `period_ms`: control period, ms.  `seed`: of the plant.
+    `period_ms`: control period, ms.  `seed`: seed of the plant's random numbers.
     """
     plant = OfflinePlant(icub(), seed, gains, dt=period_ms / 1e3)
     place(plant, start)

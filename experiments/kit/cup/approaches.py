@@ -62,7 +62,7 @@ def roomy_placement(seed: int) -> Placement:
 class RrtPlanner:
     """A `mobee.behaviours.pre_grasp.Planner` that uses OMPL's RRT-Connect and shortens the paths.
 
-    `world`: the robot in the world in which it plans.  `seed`: of the random paths.
+    `world`: the robot in the world in which it plans.  `seed`: seed of the random paths.
     """
 
     def __init__(self, world: Model, seed: int) -> None:

@@ -27,7 +27,8 @@ SMALL = 0.01  # m, radius of the target, which stands for the place of the palm
 def learner() -> ReachAgent:
     """Return the agent, which has learned to reach beside cups at random places of an empty table.
 
-    The four joints of the lattice move; torso, wrist and hand stay in the posture in which a trial begins.
+    The agent's states are postures on a lattice of four arm joints.  Only these joints move; torso, wrist and hand stay in the posture in
+    which a trial begins.  Every call returns the same object.
     """
     body = standing(robot(), ready())
     where = body.part(PART).slice
@@ -41,9 +42,10 @@ def learner() -> ReachAgent:
 
 
 def by_learner(plant: PhysicsPlant, thing: Upright) -> Approach:
-    """Bring the palm beside the cup `thing` as the agent has learned: by a plan along its states, then by a reach.
+    """Bring the palm beside the cup `thing` as the agent has learned, and return the azimuth, the numbers of bumps and plans, and the time.
 
-    The agent learns nothing from this.
+    The arm moves through the states of the agent's plan; then a reach follows, in which a force pulls the palm to its place beside the cup.
+    The agent learns nothing from this, and the returned azimuth is the wanted one, whether the palm arrived or not.
     """
     agent, target = learner(), _target(thing)
     begun = time.process_time()

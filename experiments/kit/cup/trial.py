@@ -43,12 +43,14 @@ GOALS = 24
 class Result:
     """The measures of a trial, in m, rad and s; -1: not measured, because the trial ended earlier.
 
-    `distance`: of the palm from its place beside the true cup at the pre-grasp.  `angle`: between the palm's normal and its wanted
-    direction then.  `pushed`: largest distance by which a thing was moved until then.  `knocked`: whether a thing leans more than 25
-    degrees then.  `pre_grasp`: at most 2 cm and 15 degrees, and nothing was knocked over.  `lifted`: height by which the cup was lifted.
-    `placed`: distance of the cup from its goal at the end.  `done`: whether the cup was lifted, and put down upright near its goal, and
-    nothing was knocked over.  `bumps`, `plans`: numbers.  `planning`: processor time.  `clutter`: number of pieces.  `why`: reason of a
-    failure.  `seconds`: simulated time.
+    At the end of the motion to the pre-grasp: `distance`: of the palm from its place beside the true cup; `angle`: between the palm's
+    normal and its wanted direction; `pushed`: largest distance by which a thing was moved; `knocked`: whether a thing leans more than 25
+    degrees; `pre_grasp`: whether the palm is at most 2 cm and 15 degrees from its place, and nothing was knocked over.
+
+    At the end of the trial: `lifted`: height by which the cup was lifted.  `placed`: distance of the cup from its goal.  `done`: whether
+    the cup was lifted, and put down upright near its goal, and nothing was knocked over.  `bumps`, `plans`: numbers of bumps and of plans.
+    `planning`: processor time of the plans.  `clutter`: number of pieces of clutter.  `why`: reason of a failure.  `seconds`: simulated
+    time.
     """
 
     pre_grasp: bool = False
@@ -70,8 +72,8 @@ class Result:
 class Trial:
     """A trial: the scene, the plant with the true world and the world as the cameras see it, and the planner; `run` performs it.
 
-    `method`: "map" (pre-grasp map), "learner" (learned reacher) or "rrt" (RRT-Connect).  `seed`: of the scene, the errors of the cameras
-    and the plant.
+    `method`: "map" (pre-grasp map), "learner" (learned reacher) or "rrt" (RRT-Connect).  `seed`: seed of the scene, the errors of the
+    cameras and the plant.
     """
 
     def __init__(self, method: str, seed: int) -> None:
@@ -168,7 +170,7 @@ def leans(thing: WorldObject) -> float:
 def run_trial(method: str, seed: int) -> dict[str, object]:
     """Perform a trial and return its measures as JSON values, by the names of the fields of `Result`.
 
-    `method`: "map" (pre-grasp map), "learner" (learned reacher) or "rrt" (RRT-Connect).  `seed`: of the scene, the errors of the cameras
-    and the plant.
+    `method`: "map" (pre-grasp map), "learner" (learned reacher) or "rrt" (RRT-Connect).  `seed`: seed of the scene, the errors of the
+    cameras and the plant.
     """
     return asdict(Trial(method, seed).run())

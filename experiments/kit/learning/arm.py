@@ -39,9 +39,9 @@ Neighbours = int | Literal["equidistant"]
 
 @cache
 def robot(free: bool = False) -> Robot:
-    """Return the published robot; the home of the arms' motors that do not take part is the middle of their range.
+    """Return the robot model published in 2014; arm motors that take no part in learning have their home in the middle of their range.
 
-    `free`: without clauses, so that no cable constrains the arms.
+    `free`: leave out the clauses, which are the constraints that the shoulder's cables impose.  Every call returns the same object.
     """
     loaded = mobee.load_robot(ROBOT)
     motors = tuple(replace(m, home=float(m.limits.mean())) if _is_idle(m) else m for m in loaded.motor_table)
@@ -55,10 +55,10 @@ def _is_idle(motor: Motor) -> bool:
 def arm_plant(
     seed: int, free: bool = False, world: World | None = None, gains: Gains | None = None, motors: MotorParameters | None = None
 ) -> OfflinePlant:
-    """Return a plant of the published robot in which only the four motors of the left arm move.
+    """Return a plant of the robot published in 2014, in which only the four motors of the left arm move.
 
-    `seed`: of the plant.  `free`: no cable constraints, and contacts exert no forces.  `world`: None: empty.  `gains`, `motors`: replace
-    the published ones; None: the published ones.
+    `seed`: seed of the plant's random numbers.  `free`: there are no cable constraints, and contacts exert no forces.  `world`: objects
+    around the robot; None: an empty world.  `gains`, `motors`: gains of the control law and motor parameters; None: the published ones.
     """
     law = Gains.published_2014() if gains is None else gains
     return OfflinePlant(Model(robot(free), world), seed, law, motors, DT, contact_forces=not free, active=LEFT)
@@ -76,8 +76,8 @@ def table_world(ghost: bool = False) -> World:
 def table_plant(seed: int, ghost: bool = False, propagate: Literal["tree", "part"] = "tree") -> OfflinePlant:
     """Return a plant at the table in which eleven motors move: three of the torso and four of each arm.
 
-    `ghost`: the table exerts no force; self-contacts still exert forces.  `propagate`: which motors a contact force moves: all from the
-    link down to the base ("tree"), or only those of the link's part ("part").
+    `seed`: seed of the plant's random numbers.  `ghost`: the table exerts no force; contacts between parts of the robot still do.
+    `propagate`: which motors a contact force moves: all from the link down to the base ("tree"), or only those of the link's part ("part").
     """
     law, moving = Gains.published_2014(), (*TORSO, *LEFT, *RIGHT)
     return OfflinePlant(Model(robot(), table_world(ghost)), seed, law, dt=DT, propagate=propagate, active=moving)
@@ -86,16 +86,20 @@ def table_plant(seed: int, ghost: bool = False, propagate: Literal["tree", "part
 def arm_space(
     levels: Sequence[float] = RANK3, neighbours: Neighbours = "equidistant", tie_seed: int = 0, joints: Sequence[str] = LEFT
 ) -> Lattice:
-    """Return a lattice over the four joints of an arm.
+    """Return a lattice of states over the four joints of an arm.
 
     `levels`: values of each joint, as shares of its range.  `neighbours`: number of nearest states to which a state has actions, or
-    "equidistant".  `tie_seed`: of the choice among equally near states.  `joints`: names of the joints, by default those of the left arm.
+    "equidistant": the states one level away along one joint.  `tie_seed`: seed of the choice among equally near states.  `joints`: names of
+    the joints, by default those of the left arm.
     """
     return Lattice(robot(), joints, levels, neighbours, tie_seed)
 
 
 def torso_space(tie_seed: int = 0) -> Lattice:
-    """Return the lattice of the torso: 27 states with 8 neighbours each; `tie_seed`: of the choice among equally near states."""
+    """Return the lattice of the torso: 27 states with actions to the 8 nearest states each.
+
+    `tie_seed`: seed of the choice among equally near states.
+    """
     return Lattice(robot(), TORSO, RANK3, TORSO_NEIGHBOURS, tie_seed)
 
 
@@ -121,10 +125,10 @@ def arm_clauses() -> list[Clause]:
 
 @cache
 def min_margin() -> float:
-    """Return the smallest distance from a clause at which a pose counts as clear, in units of a.q + b.
+    """Return the smallest value of a.q + b, the distance from a cable constraint, at which a pose counts as clear of this constraint.
 
-    The distance is half the zone in which the law pushes.  There the force moves a resting arm by about three degrees, a quarter of the
-    distance to the edge of a cell of the rank 3 lattice.
+    It is half the width of the zone in which the published control law pushes the arm away from a constraint.  At this distance the force
+    moves a resting arm by about three degrees, a quarter of the distance to the edge of a cell of the lattice with three levels per joint.
     """
     return Gains.published_2014().constraint_width / 2.0
 
@@ -138,9 +142,10 @@ def whole(q: Array) -> Array:
 
 
 def clear(model: Model, q: Array, clauses: Sequence[Clause]) -> NDArray[np.bool_]:
-    """Return for each pose q (P, 4) rad of the left arm whether no field is in contact and all clauses are farther than `min_margin`, (P,).
+    """Return which poses q (P, 4) rad of the left arm are clear, (P,): nothing touches, and no cable constraint is near.
 
-    `model`: the robot in its world.  `clauses`: the constraints that count.
+    Neither solids nor fields (the larger volumes that cause repulsive forces) may touch.  `model`: the robot in its world.  `clauses`: the
+    cable constraints that count; each must be at least `min_margin` away.
     """
     poses = whole(q)
     good = np.ones(len(poses), dtype=bool)

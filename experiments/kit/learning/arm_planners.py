@@ -54,14 +54,17 @@ class Belief:
         """Number of poses that were checked so far."""
 
     def sound(self, q: Array, cables: bool = True) -> NDArray[np.bool_]:
-        """Return which of the poses (P, 4) rad of the arm are sound, (P,); `cables`: whether the cable constraints count."""
+        """Return which of the poses (P, 4) rad of the arm are sound, (P,): clear of contacts and of the known cable constraints.
+
+        `cables`: whether the cable constraints count.
+        """
         self.checked += len(q)
         return clear(self._model, q + self._turns, self._clauses if cables else ())
 
     def sound_motion(self, start: Array, end: Array, cables: bool = True) -> bool:
-        """Return whether the straight motion between two poses (4,) rad is sound; the start pose is not checked.
+        """Return whether all poses on the straight path between two poses (4,) rad are sound: clear of contacts and cable constraints.
 
-        `cables`: whether the cable constraints count.
+        The start pose is not checked.  `cables`: whether the cable constraints count.
         """
         count = max(1, int(np.ceil(np.abs((end - start) / self.span).max() / STEP)))
         shares = np.arange(1, count + 1)[:, None] / count
@@ -160,9 +163,10 @@ def edge(first: int, second: int) -> Edge:
 
 
 def make_roadmap(kind: str, belief: Belief, lattice: Lattice, seed: int) -> Roadmap:
-    """Build a roadmap of which all motions are sound in the planner's model.
+    """Build a roadmap whose motions are all sound in the planner's model: clear of contacts and of the cable constraints that it knows.
 
-    `kind`: "OMPL": a PRM with 300 vertices; "lattice": the sound samples and actions of the lattice.  `seed`: of the PRM.
+    `kind`: "OMPL": a PRM with 300 vertices; "lattice": the sound samples (poses of states) and sound actions of the lattice.  `seed`: seed
+    of the PRM.
     """
     if kind == "OMPL":
         return ompl_roadmap(belief, MILESTONES, NEIGHBOURS, seed)
@@ -174,7 +178,10 @@ def make_roadmap(kind: str, belief: Belief, lattice: Lattice, seed: int) -> Road
 
 
 def with_goals(roadmap: Roadmap, lattice: Lattice, goals: Ints) -> dict[int, int]:
-    """Add the samples of the states `goals` to the roadmap, where it has no vertex yet; returns the number of the vertex by state."""
+    """Add a vertex to the roadmap for each lattice state in `goals` that has none yet; returns a dict from the state to its vertex number.
+
+    The vertex of a state is its sample, the pose (4,) rad in the middle of the state's cell.
+    """
     found = {}
     for state in sorted({int(goal) for goal in goals}):
         sample = lattice.samples[state]
@@ -205,11 +212,11 @@ class Rival(Protocol):
         """Return the pose (4,) rad to which the arm moves next from the pose q (4,) rad; None: the planner gives up."""
 
     def observe(self, start: Array, end: Array) -> None:
-        """Observe the poses (4,) rad in which the last motion started and ended."""
+        """Take note of the outcome of the last motion; `start`, `end`: poses (4,) rad in which the motion started and ended."""
 
 
 class Straight:
-    """A `Rival` that moves straight to the sample of the goal state, again and again."""
+    """A `Rival` that moves straight to the sample of the goal state (the pose that stands for this state), again and again."""
 
     repairs = 0
 
@@ -221,7 +228,7 @@ class Straight:
         self._goal = goal
 
     def aim(self, q: Array) -> Array | None:
-        """Return the sample of the goal state, (4,) rad, whatever q is, as in `Rival.aim`."""
+        """Return the sample of the goal state, (4,) rad, which is the pose that stands for this state; it does not depend on q."""
         sample: Array = self._space.samples[self._goal]
         return sample
 
@@ -297,7 +304,10 @@ class Repaired:
         return self._roadmap.pose(self._to)
 
     def observe(self, start: Array, end: Array) -> None:
-        """Remove the last motion if it ended away from its vertex, by more than 1/8 of a joint's range, as in `Rival.observe`."""
+        """Remove the last motion if it ended more than 1/8 of a joint's range away from its vertex; then `repairs` is increased by 1.
+
+        `start`, `end`: poses (4,) rad in which the motion started and ended, as in `Rival.observe`.
+        """
         off = np.abs((end - self._roadmap.pose(self._to)) / self._roadmap.belief.span)
         if off.max() <= ARRIVED:
             self._at = self._to
@@ -333,14 +343,21 @@ class Learned:
         self._goal = goal
 
     def aim(self, q: Array) -> Array | None:
-        """Return the sample (4,) rad of the goal of the planned action in the state of q (4,) rad, as in `Rival.aim`."""
+        """Return the next pose (4,) rad: the sample of the state to which the planned action leads from the state of the pose q (4,) rad.
+
+        The sample of a state is the pose that stands for it.  The planned action is remembered for the next call of `observe`.
+        """
         state = self._space.state_of(q)
         self._action = int(Planner(self._space, self._model.debiased(), [self._goal]).policy[state])
         sample: Array = self._space.samples[self._space.goal(state, self._action)]
         return sample
 
     def observe(self, start: Array, end: Array) -> None:
-        """Observe the transition from the state of `start` to the state of `end`, poses (4,) rad, with the model, as in `Rival.observe`."""
+        """Update the transition model with the outcome of the last motion, as in `Rival.observe`.
+
+        `start`, `end`: poses (4,) rad in which the motion started and ended.  The model learns the state of `start`, the action chosen by
+        the last call of `aim`, and the state of `end`.  If this is not the goal state of the action, `repairs` is increased by 1.
+        """
         before, after = self._space.state_of(start), self._space.state_of(end)
         self.repairs += after != self._space.goal(before, self._action)
         self._model.observe(before, self._action, after)

@@ -16,14 +16,18 @@ from mobee.store import Transition
 
 
 def begin_anywhere(space: Space, plant: OfflinePlant, seed: int) -> None:
-    """Move the part of the space towards a random state, as at the beginning of the published runs; no agent observes this motion."""
+    """Move the space's part of the robot towards a random state, as at the beginning of the published runs; no agent learns from this.
+
+    `seed`: seed of the choice of the state.
+    """
     plant.act(space.part, space.target(int(np.random.default_rng(seed).integers(len(space)))))
 
 
 def begin_nearby(space: Space, plant: Plant, seed: int) -> int:
-    """Move the part of the space to a random neighbour of its state, and return the number of the state that was reached.
+    """Move the space's part of the robot to a random neighbour of its present state, and return the number of the state that was reached.
 
-    No agent observes this motion, because it does not start at a sample.
+    No agent learns from this motion, because it may start anywhere in the cell of a state, and actions start at the cell's sample. `seed`:
+    seed of the choice of the neighbour.
     """
     state = space.state_of(plant.measure(space.part))
     goal = int(np.random.default_rng(seed).choice(space.actions(state)))
@@ -76,9 +80,9 @@ class Log:
 
     seen: list[tuple[int, int, int]] = field(default_factory=list)
     settled: list[bool] = field(default_factory=list)
-    durations: list[float] = field(default_factory=list)  # s
-    ends: list[float] = field(default_factory=list)  # s of plant time
-    touched: list[tuple[str, ...]] = field(default_factory=list)  # world objects in contact at the end
+    durations: list[float] = field(default_factory=list)
+    ends: list[float] = field(default_factory=list)
+    touched: list[tuple[str, ...]] = field(default_factory=list)
     poses: list[Array] = field(default_factory=list)
 
     def arrays(self, part: str, count: int) -> dict[str, Any]:

@@ -148,7 +148,11 @@ def learn_live(task: str, robot: str, seed: int, transitions: int, folder: Path,
 
 
 def observed(folder: Path, task: str, number: int) -> dict[str, Any]:
-    """Return the first `number` transitions of each part that `learn_live` stored in `folder`, in the form that `learn_offline` returns."""
+    """Return the first `number` transitions of each part of a task that `learn_live` stored in `folder`; `task`: name of the task.
+
+    Returns for each part "seen_<part>": transitions (T, 3): state, action, state reached; and "touched_<part>": (T,), whether each ended in
+    contact with an object of the world.
+    """
     values: dict[str, Any] = {}
     for part in TASKS[task].parts:
         with TransitionStore(folder / STORE, part, read_only=True) as store:
@@ -219,7 +223,8 @@ def shares(counts: Ints) -> Array:
 def distance(first: Counts, second: Counts, least: int) -> Distance:
     """Return the distance between two records, over the state-actions of all parts that both tried at least `least` times.
 
-    `first`, `second`: counts of outcomes (S, A, S) by part.  Without such state-actions the numbers are NaN.
+    `first`, `second`: counts of outcomes (S, A, S) by part.  If there are no such state-actions, `variation` and `agree` are NaN and
+    `compared` is 0.
     """
     apart = np.concatenate([variations(first[part], second[part], least).ravel() for part in first])
     same = np.concatenate([(first[part].argmax(axis=-1) == second[part].argmax(axis=-1)).ravel() for part in first])
@@ -238,10 +243,10 @@ def mean(distances: Sequence[Distance]) -> Distance:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Compared:
-    """The distances of the live robots, and of the offline runs with different seeds, of a task.
+    """How far the outcomes of a task on each live robot, and in each offline run, are from those of offline runs with other seeds.
 
-    `live`: by robot: the mean of its distances from all offline runs but one, over the omitted run.  `offline`: for each offline run, its
-    distance from all other offline runs together.
+    `live`: dict from a robot's name to its distance: the mean over the offline runs, where one offline run is left out in turn and the
+    distance is that from all the others together.  `offline`: for each offline run, its distance from all other offline runs together.
     """
 
     live: dict[str, Distance]
@@ -293,7 +298,10 @@ class Contacts:
 
     @classmethod
     def of(cls, space: Lattice, seen: Ints, touched: NDArray[np.bool_]) -> Contacts:
-        """Count the actions in transitions `seen` (T, 3); `touched`: (T,), whether each ended in contact with an object of the world."""
+        """Count the actions in transitions `seen` (T, 3), rows of state, action, state reached.
+
+        `touched`: (T,), whether each action ended in contact with an object of the world.
+        """
         missed = seen[:, 2] != space.goals[seen[:, 0], seen[:, 1]]
         return cls(int(missed.sum()), int(touched.sum()), int((missed & touched).sum()), len(seen))
 
@@ -305,7 +313,7 @@ class Contacts:
 def contacts(folder: Path, task: str) -> dict[str, dict[str, Contacts]]:
     """Return how the actions of a task ended, by robot and part; under "offline" for all offline runs together.
 
-    `folder`: of the experiment's run.  `task`: "arms", "table" or "published".
+    `folder`: folder of the experiment's run.  `task`: "arms", "table" or "published".
     """
     robot, found = load_robot(ROBOT), dict[str, dict[str, Contacts]]()
     results = [r.values for r in load_cells(folder).values() if r.cell.settings["task"] == task]

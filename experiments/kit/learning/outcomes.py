@@ -32,27 +32,36 @@ def in_order(seen: Ints) -> Ints:
 
 
 def goals_of(space: Lattice, seen: Ints) -> Ints:
-    """Return the goal state of the action of each transition, (T,); `seen`: transitions (T, 3)."""
+    """Return the goal state of the action of each transition, (T,).
+
+    `seen`: transitions (T, 3), rows of state, action, state reached.
+    """
     found: Ints = space.goals[seen[:, 0], seen[:, 1]]
     return found
 
 
 def tries_of(space: Lattice, seen: Ints) -> Ints:
-    """Return the number of tries of each state-action, (S, A), in transitions `seen` (T, 3)."""
+    """Return the number of tries of each state-action, (S, A).
+
+    `seen`: transitions (T, 3), rows of state, action, state reached.
+    """
     tries = np.zeros(space.goals.shape, dtype=np.intp)
     np.add.at(tries, (seen[:, 0], seen[:, 1]), 1)
     return tries
 
 
 def failures_of(space: Lattice, seen: Ints) -> Ints:
-    """Return the number of tries of each state-action that did not end in its goal, (S, A), in transitions `seen` (T, 3)."""
+    """Return the number of tries of each state-action that did not end in the goal of the action, (S, A).
+
+    `seen`: transitions (T, 3), rows of state, action, state reached.
+    """
     return tries_of(space, seen[seen[:, 2] != goals_of(space, seen)])
 
 
 def failure_shares(space: Lattice, seen: Ints) -> Array:
     """Return the share of the tries of each state-action that did not end in its goal, (S, A); NaN without tries.
 
-    `seen`: transitions (T, 3).
+    `seen`: transitions (T, 3), rows of state, action, state reached.
     """
     with np.errstate(invalid="ignore"):
         shares: Array = failures_of(space, seen) / tries_of(space, seen)
@@ -60,14 +69,17 @@ def failure_shares(space: Lattice, seen: Ints) -> Array:
 
 
 def visits_of(space: Lattice, seen: Ints) -> Ints:
-    """Return how often each state was reached, (S,), in transitions `seen` (T, 3)."""
+    """Return how often each state was reached, (S,); the state in which the first transition starts is not counted.
+
+    `seen`: transitions (T, 3), rows of state, action, state reached.
+    """
     return np.bincount(seen[:, 2], minlength=len(space))
 
 
 def ends_of(space: Lattice, seen: Ints, source: int, goal: int) -> dict[int, int]:
     """Return how often the action from the state `source` to the state `goal` ended in each state, the most frequent first.
 
-    `seen`: transitions (T, 3).
+    `seen`: transitions (T, 3), rows of state, action, state reached.
     """
     tried = (seen[:, 0] == source) & (goals_of(space, seen) == goal)
     states, counts = np.unique(seen[tried, 2], return_counts=True)
@@ -75,13 +87,16 @@ def ends_of(space: Lattice, seen: Ints, source: int, goal: int) -> dict[int, int
 
 
 def outcome_counts(space: Lattice, seen: Ints) -> Ints:
-    """Return the number of different states in which each state-action ended, (S, A), in transitions `seen` (T, 3)."""
+    """Return the number of different states in which each state-action ended, (S, A).
+
+    `seen`: transitions (T, 3), rows of state, action, state reached.
+    """
     number = np.ravel_multi_index(seen.T, (*space.goals.shape, len(space)))  # one number a transition: rows are compared much more slowly
     return tries_of(space, seen[np.unique(number, return_index=True)[1]])
 
 
 def exists_in(space: Lattice) -> NDArray[np.bool_]:
-    """Return the mask (S, A) of the entries that are actions: a state may have fewer than A actions."""
+    """Return the mask (S, A) of the entries that are actions, True where an action exists: a state may have fewer than A actions."""
     return np.asarray(space.goals >= 0)
 
 
@@ -93,13 +108,16 @@ def first_places(values: ArrayLike) -> Ints:
 def first_tries(space: Lattice, seen: Ints) -> Ints:
     """Return the numbers of the transitions that tried a state-action for the first time, counted from 1, ascending.
 
-    `seen`: transitions (T, 3), in order of time.
+    `seen`: transitions (T, 3), rows of state, action, state reached, in order of time.
     """
     return first_places(seen[:, 0] * space.goals.shape[1] + seen[:, 1]) + 1
 
 
 def uncertain_in(space: Lattice, seen: Ints) -> int:
-    """Return the number of state-actions that failed in 10 to 90 % of their tries, in transitions `seen` (T, 3)."""
+    """Return the number of state-actions that failed in 10 to 90 % of their tries.
+
+    `seen`: transitions (T, 3), rows of state, action, state reached.
+    """
     return uncertain_of(failures_of(space, seen), tries_of(space, seen))
 
 
@@ -111,10 +129,10 @@ def uncertain_of(failures: Ints, tries: Ints) -> int:
 
 @dataclass(frozen=True, eq=False)
 class Explored:
-    """Counts of one run.
+    """Counts of the transitions of one run.
 
-    `tries`, `failures`: (E,), of the state-actions that exist.  `visits`: (S,), how often each state was reached.  `values`: all values of
-    the run's cell, by name.
+    `seed`: seed of the run.  `tries`, `failures`: (E,), how often each of the E existing state-actions was tried, and failed.  `visits`:
+    (S,), how often each state was reached.  `values`: all values that the run returned, by name.
     """
 
     seed: int

@@ -98,11 +98,14 @@ def _posture(model: Model, palm: tuple[float, float, float]) -> Array:
 
 
 class Stage:
-    """An arm, a cup that it pushes, and an agent that perceives the cup or something else in its place.
+    """An arm, a cup that it pushes, and an agent that learns how its actions move the cup.
+
+    The agent perceives the cup at the place that the function `source` returns, with random errors.  At first this is the cup's true place;
+    an experiment may replace the function, so that the agent perceives something else as the cup.
 
     Args:
         arrangement: postures, grid and first place of the cup.
-        seed: of the plant, the errors of perceived places, and the agent.
+        seed: of the random numbers of the plant, of the errors of perceived places, and of the agent.
         explorer: name of the agent's explorer.
     """
 

@@ -46,7 +46,7 @@ class RewardedPlant(TabularPlant):
 
 
 def learned(agent: Explorable) -> Any:
-    """Return the beliefs that follow from the agent's counts alone: an action that was never tried stays in its state."""
+    """Return the agent's transition model with probabilities from its counts alone; an action that was never tried stays in its state."""
     return agent.model.debiased(goal=PRIOR, stay=0.0)
 
 
@@ -145,7 +145,10 @@ class EpsilonGreedy:
 
 
 def all_counts(agent: Explorable) -> Array:
-    """Return how often each state-action led to each state, (S, A, S); imagined outcomes of the prior are not counted."""
+    """Return how often each state-action led to each state, (S, A, S).
+
+    The model's pseudo-counts of its prior (imagined outcomes), which it has before the first try, are not counted.
+    """
     model = agent.model
     real = np.where(model.counts > 0.0, model.counts - model.imagined, 0.0)
     states, actions, _ = real.shape

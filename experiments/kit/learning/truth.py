@@ -58,7 +58,8 @@ def truth_of(space: Space, seen: Ints) -> Truth:
 def walk(space: Space, plant_of: Callable[[int], Plant], tries: int, most: int, seed: int) -> Ints:
     """Walk through the states until every action was tried `tries` times; returns the transitions (T, 3): state, action, state reached.
 
-    `plant_of`: returns a plant for a seed.  `most`: largest number of transitions.
+    `plant_of`: function that returns a new plant for a seed.  `most`: largest number of transitions, after which the walk ends in any case.
+    `seed`: seed of the plant and of the random actions.
     """
     plant, rng = plant_of(seed), np.random.default_rng(seed)
     model, values = TransitionModel(space), np.zeros(len(space))
@@ -81,9 +82,10 @@ def walk(space: Space, plant_of: Callable[[int], Plant], tries: int, most: int, 
 
 
 def l1(beliefs: OutcomeModel, truth: OutcomeModel) -> Array:
-    """Return the L1 error of the beliefs, the sum of |p - q| over the outcomes of each state-action, (S, A), 0 to 2; NaN without truth.
+    """Return the L1 error of the beliefs, the sum of |p - q| over the outcomes of each state-action, (S, A), 0 to 2.
 
-    The bins of the two models may differ in order and number, and several bins may stand for one state.
+    The error is NaN where the truth has no outcome, because there is no action or no try.  The outcomes of the two models may differ in
+    order and number, and several outcomes of a model may stand for the same state: their probabilities are added.
     """
     states, actions = truth.outcomes.shape[:2]
     pair = np.arange(states * actions)[:, None]

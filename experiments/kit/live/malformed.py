@@ -183,7 +183,7 @@ class Drawer:
 def send(endpoint: str, seed: int, count: int, parts: dict[str, int]) -> Counter[str]:
     """Send `count` drawn messages, requests and tokens to a running system; returns the numbers sent: "messages", "calls", "tokens".
 
-    `endpoint`: address of the router.  `parts`: number of motors of each part, by name.
+    `endpoint`: address of the router.  `seed`: seed by which they are drawn.  `parts`: number of motors of each part, by name.
     """
     drawer, draw, sent = Drawer(seed, parts), random.Random(seed), Counter[str]()
     with open_client(endpoint) as session:

@@ -29,20 +29,20 @@ OLDEST = 0.1  # s between the beginning of a tick and of the last one in which a
 class Moment:
     """The state of a part at one tick.
 
-    `run`, `k`: the run and the number of the tick.  `t`: s, simulated time of the bus.  `at`: s, monotonic time of the machine.  `gate`,
-    `mode`: of the gate, as in the message `State`.  `age`: ticks, of the command in force.  `q`: rad.  `speed`: rad/s, of the fastest
-    motor.
+    `run`, `k`: the run and the number of the tick.  `t`: s, simulated time of the bus.  `at`: s, monotonic time of the machine.  `gate`:
+    state of the gate, the last check of commands before the motors, as "armed".  `mode`: kind of the command in force, as "hold".  `age`:
+    age of this command, in ticks.  `q`: measured positions of the part's motors, rad.  `speed`: rad/s, of the fastest motor.
     """
 
     run: str
     k: int
-    t: float  # s, bus clock
-    at: float  # s, robot_sim's monotonic clock, which is that of the machine
+    t: float
+    at: float
     gate: str
     mode: str
-    age: int  # ticks, of the command in force
+    age: int
     q: Array
-    speed: float  # rad/s, of the fastest motor
+    speed: float
 
 
 @dataclass
@@ -60,15 +60,15 @@ class Observer:
     """
 
     parts: dict[str, list[Moment]] = field(default_factory=dict)
-    ticks: dict[tuple[str, int], float] = field(default_factory=dict)  # run, k -> s, by robot_sim's monotonic clock
-    motions: dict[str, list[tuple[float, str, str]]] = field(default_factory=dict)  # by part: changes of status and action, when they came
-    published: dict[tuple[str, int], tuple[Any, ...]] = field(default_factory=dict)  # agent, n -> s, a, s_next, settled, duration
-    conflicts: list[str] = field(default_factory=list)  # a line for each number under which two different transitions were published
-    locked: bool = False  # whether the robot runs in lockstep
+    ticks: dict[tuple[str, int], float] = field(default_factory=dict)
+    motions: dict[str, list[tuple[float, str, str]]] = field(default_factory=dict)
+    published: dict[tuple[str, int], tuple[Any, ...]] = field(default_factory=dict)
+    conflicts: list[str] = field(default_factory=list)
+    locked: bool = False
     lock: threading.Lock = field(default_factory=threading.Lock)
 
     def attach(self, session: Any) -> None:
-        """Subscribe to the ticks and to the streams of all parts and agents; `session`: of Zenoh."""
+        """Subscribe to the ticks and to the streams of all parts and agents; `session`: a Zenoh session."""
         listen(session, Tick.stream.key(), self._note_tick)
         listen(session, State.stream.keys(), self._note_state)
         listen(session, Motion.stream.keys(), self._note_motion)
@@ -157,7 +157,7 @@ class Stop:
 def stop_after(states: list[Moment], fault: float, until: float) -> Stop | None:
     """Return how a part stopped after a fault; None if it was not moving by a command at that time.
 
-    `states`: of the part, in order of time.  `fault`, `until`: monotonic times [s] of the fault and of the end of the observation.
+    `states`: states of the part, in order of time.  `fault`, `until`: monotonic times [s] of the fault and of the end of the observation.
     """
     before = [state for state in states if state.at <= fault]
     if not before or before[-1].gate != "armed" or before[-1].mode == "hold" or before[-1].speed < MOVES:
@@ -172,8 +172,9 @@ def stop_after(states: list[Moment], fault: float, until: float) -> Stop | None:
 def survived(changes: list[tuple[float, str, str]], fault: float, until: float) -> bool | None:
     """Return whether the action that was under way at the time `fault` has survived until the time `until`; None if there was no action.
 
-    The action has survived if it still moves, waits for the model, or has ended with an outcome.  `changes`: of the part's motion: time of
-    arrival [s], status, action; `fault`, `until`: monotonic times [s].
+    The action has not survived if the part's motion became "held" or "idle", or another action began.  It has survived if it ended with an
+    outcome ("settled" or "timeout"), or has not ended yet.  `changes`: changes of the part's motion: time of arrival [s], status, name of
+    the action.  `fault`, `until`: monotonic times [s].
     """
     before = [change for change in changes if change[0] <= fault]
     if not before or before[-1][1] != "moving":
@@ -210,7 +211,7 @@ def violations(states: Mapping[str, list[Moment]], robot: Robot, noise: float) -
 def too_old(ages: Sequence[float]) -> list[str]:
     """Return one line of text if a command was obeyed more than OLDEST (0.1 s) after the tick that it answers, else [].
 
-    `ages`: of the commands, s, as `Observer.take` returns them.
+    `ages`: ages of the commands [s], as `Observer.take` returns them.
     """
     oldest = max(ages, default=0.0)
     return [f"a command was obeyed {1e3 * oldest:.0f} ms after the tick that it answers began"] if oldest > OLDEST else []

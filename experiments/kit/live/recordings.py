@@ -45,8 +45,8 @@ def read_touches(path: Path, dt: float) -> list[Touch]:
 def touches(rows: Iterable[tuple[int, str, float]], gap: int) -> list[Touch]:
     """Group contacts into events, and return the events in order of their beginning.
 
-    `rows`: tick, pair of shapes and depth [m] of each contact, in order of the ticks.  `gap`: a new event of a pair begins if its last
-    contact was more than so many ticks ago.
+    `rows`: tick, pair of shapes and depth [m] of each contact, in order of the ticks.  `gap`: number of ticks; a contact that comes more
+    than `gap` ticks after the last contact of the same pair begins a new event.
     """
     open_: dict[str, Touch] = {}
     found: list[Touch] = []

@@ -85,7 +85,7 @@ def wait_for(condition: Callable[[], Any], timeout: float, what: str, period: fl
 
 
 def stat_of(session: Any, who: str, timeout: float = 0.5) -> Stat | None:
-    """Return the status of the service `who`; None if it does not answer within `timeout` s.  `session`: of Zenoh."""
+    """Return the status of the service `who`; None if it does not answer within `timeout` s.  `session`: a Zenoh session."""
     try:
         return rpc.call(session, "observer", keys.service_rpc(who, "stat"), Empty, Stat, timeout=timeout)
     except rpc.CallFailed:

@@ -84,7 +84,7 @@ class Wire:
 def run(ends: tuple[int, int], seed: int, commands: BinaryIO) -> None:
     """Carry packets between two interfaces until the stream `commands` ends.
 
-    `ends`: file descriptors of the interfaces.  `seed`: of the random faults.  `commands`: each line has new `Faults` as JSON.
+    `ends`: file descriptors of the interfaces.  `seed`: seed of the random faults.  `commands`: each line has new `Faults` as JSON.
     """
     wire = Wire(ends, seed)
     with selectors.DefaultSelector() as selector:

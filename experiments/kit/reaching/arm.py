@@ -38,9 +38,9 @@ TRANSITIONS = 3000  # curious ones, enough to learn the lattice (thesis 7.2.2: 2
 
 @dataclass(frozen=True)
 class Law:
-    """A control law.
+    """A control law, its period and the aim of reaches; in a reach, a force pulls the palm to a target.
 
-    `gains`: its gains.  `dt`: control period, s.  `aim`: whether reaches aim at the "centre" or the "surface" of the target.
+    `gains`: gains of the law.  `dt`: control period, s.  `aim`: whether the force pulls to the "centre" or the "surface" of the target.
     """
 
     gains: Gains
@@ -52,21 +52,25 @@ class Law:
 def laws() -> dict[str, Law]:
     """Return the two control laws by name, "published" and "default".
 
-    Under the published law the force of a reach pulls against the attractor; under the default law the marker arrives at the target.
+    Under the published law the attractor stays at its place during a reach and pulls against the reach's force; under the default law the
+    marker arrives at the target.
     """
     return {"published": Law(Gains.published_2014(), DT, "centre"), "default": Law(Gains.default(), 0.01, "surface")}
 
 
 @cache
 def reach_space() -> Lattice:
-    """Return the 81 states of the right arm's four joints with equidistant neighbours: 432 actions; every call returns the same object."""
+    """Return the lattice of the right arm's four joints, 81 states and 432 actions; every call returns the same object.
+
+    An action leads to a state one level away along one joint.
+    """
     return arm_space(RANK3, joints=RIGHT)
 
 
 def reach_plant(seed: int, law: str = "published") -> OfflinePlant:
     """Return a plant of the robot of 2014 in an empty world, in which only the four motors of the right arm move.
 
-    `seed`: of the plant.  `law`: name of the control law, "published" or "default".
+    `seed`: seed of the plant's random numbers.  `law`: name of the control law, "published" or "default".
     """
     chosen = laws()[law]
     return OfflinePlant(Model(published_robot()), seed, chosen.gains, dt=chosen.dt, active=RIGHT)
@@ -75,7 +79,7 @@ def reach_plant(seed: int, law: str = "published") -> OfflinePlant:
 def learned_beliefs(plant: OfflinePlant, seed: int, transitions: int = TRANSITIONS) -> OutcomeModel:
     """Return the transition model that a curious agent learns on the plant without a target; reaching does not change it (thesis 8.1).
 
-    `seed`: of the agent and its start.  `transitions`: number that the agent makes.
+    `seed`: seed of the agent and its start.  `transitions`: number of transitions that the agent makes.
     """
     space = reach_space()
     begin_anywhere(space, plant, seed)
@@ -132,8 +136,8 @@ def _motors(law: str) -> list[int]:
 def arm_plant(seed: int, world: World | None = None, motors: MotorParameters | None = None, law: str = "default") -> OfflinePlant:
     """Return a plant in which only the four motors of the right arm move.
 
-    `seed`: of the plant.  `world`: None: empty.  `motors`: None: the default ones.  `law`: "default" with today's robot, or "published"
-    with the robot of 2014.
+    `seed`: seed of the plant's random numbers.  `world`: objects around the robot; None: an empty world.  `motors`: motor parameters; None:
+    the default ones.  `law`: "default" with today's robot, or "published" with the robot of 2014.
     """
     chosen = laws()[law]
     return OfflinePlant(Model(body(law), world), seed, chosen.gains, motors, chosen.dt, active=RIGHT)
@@ -152,8 +156,8 @@ def arm_belief(world: World | None = None, cables: bool = True, turns: Array | N
 def learned_transitions(plant: OfflinePlant, seed: int, transitions: int = TRANSITIONS, law: str = "default") -> TransitionModel:
     """Return the transition model that a curious agent learns on the plant without a target.
 
-    `seed`: of the agent.  `transitions`: number that the agent makes.  `law`: "default" with today's robot, or "published" with the robot
-    of 2014.
+    `seed`: seed of the agent.  `transitions`: number of transitions that the agent makes.  `law`: "default" with today's robot, or
+    "published" with the robot of 2014.
     """
     agent = CuriousAgent(space(law), plant, seed=seed)
     agent.run(transitions)
@@ -161,17 +165,21 @@ def learned_transitions(plant: OfflinePlant, seed: int, transitions: int = TRANS
 
 
 def reach_agent(plant: ReachPlant, model: TransitionModel, seed: int, law: str = "default") -> ReachAgent:
-    """Return the reach learner: with the default predictor, and failures remembered by place.
+    """Return the reach learner: it predicts rewards by a Gaussian process, and remembers failed transitions for each target position.
 
-    `model`: transition model that the agent continues to learn (thesis 9.4.1).  `law`: "default" with today's robot, or "published" with
-    the robot of 2014.
+    `model`: transition model that the agent continues to learn (thesis 9.4.1).  `seed`: seed of the agent.  `law`: "default" with today's
+    robot, or "published" with the robot of 2014.
     """
     where = {"hands": hands(law), "jacobians": jacobians(law)}
     return LEARNERS["gp-ucb"].agent(space(law), plant, marker=MARKER, model=model, seed=seed, **where)
 
 
 def straight_paths(pairs: Sequence[tuple[int, int]], points: int = 21) -> Array:
-    """Return `points` poses on the straight path between the samples of each pair of states, (pairs, points, 4) rad."""
+    """Return poses on straight paths between states of the right arm, (pairs, points, 4) rad; `points`: number of poses on each path.
+
+    `pairs`: numbers of the first and the last state of each path, which leads from the first state's sample (the pose that stands for the
+    state) to the last state's sample.
+    """
     samples, shares = space().samples, np.linspace(0.0, 1.0, points)[:, None]
     found: Array = np.array([samples[a] + shares * (samples[b] - samples[a]) for a, b in pairs])
     return found
@@ -189,7 +197,7 @@ class Errors:
 
 
 class JudgedPlant(WrappedPlant[OfflinePlant]):
-    """An offline plant with wrong encoders and eyes: control uses these, but the result of a reach is measured in the true poses.
+    """An offline plant with wrong encoders and eyes: control uses their readings, but results of reaches are measured in the true poses.
 
     Args:
         plant: the plant that moves.
@@ -245,7 +253,10 @@ class JudgedPlant(WrappedPlant[OfflinePlant]):
         )
 
     def missing(self, marker: str) -> float:
-        """Return the true remaining error of the marker now, m: its distance from the centre or surface of the target, at which it aims."""
+        """Return the true remaining error of the marker now, m: its distance from the centre or surface of the target, at which it aims.
+
+        Raises InvalidValue if no target is presented.
+        """
         return self._true.missing(self.marker_at(marker))
 
     def marker_at(self, marker: str, part: str | None = None, q: Array | None = None) -> Array:

@@ -24,17 +24,18 @@ from mobee.robot.robot import Clause
 STEP = 0.02  # of a motor's range, between two poses of a motion that are checked
 NEAR = 0.08  # of the motors' ranges: distance from a blocked pose within which poses count as blocked
 Care = Literal["grasping", "solids", "fields"]
-"""Contacts that are forbidden.
+"""Names of sets of contacts that are forbidden in a pose.
 
-"solids": all contacts of solids.  "grasping": these, but the hand may touch the target.  "fields": contacts of solids and of fields, but
-the hand's fields may touch the target.
+"solids": all contacts of solids.  "grasping": all contacts of solids, except those of the hand with the target.  "fields": all contacts of
+solids and of fields (larger volumes that cause repulsive forces), except those of the hand's fields with the target.
 """
 
 
 class PeerBelief:
     """A planner's model of robot and world.
 
-    A pose is sound if it is within the limits and away from blocked poses, violates no known clause, and has no forbidden contact.
+    A pose is sound if it is within the limits and away from blocked poses, violates no clause that the planner knows, and has no forbidden
+    contact.  A clause is a condition on several motor positions, which the shoulder's cables impose.
 
     Args:
         model: the robot in the world, as the planner believes it to be; other code must not edit it.
@@ -42,7 +43,7 @@ class PeerBelief:
         marker: the marker that is brought to the target.
         clauses: the clauses that the planner knows.
         gains: gains of the law under which motions are executed.
-        turns: (d,) rad, believed minus measured angles of the motors; None: 0.
+        turns: (d,) rad, error of the encoders as the planner believes it: believed minus measured angles of the motors; None: 0.
     """
 
     def __init__(
@@ -74,7 +75,11 @@ class PeerBelief:
         world.add(TARGET, sphere(target.radius), position=target.position, role="target")
 
     def whole(self, q: Array) -> Array:
-        """Return the believed poses of the robot (..., n) rad for encoder readings q (..., d) rad of the motors that move."""
+        """Return the poses (..., n) rad in which the planner believes the robot to be for encoder readings q (..., d) rad.
+
+        The readings are those of the d motors with which motions are planned.  The believed angle of such a motor is its reading plus the
+        error in `turns`; all other motors are at home.
+        """
         home = self.model.robot.home
         poses = np.empty((*q.shape[:-1], len(home)))
         poses[...] = home
@@ -82,9 +87,12 @@ class PeerBelief:
         return poses
 
     def sound(self, q: Array, care: Care = "solids") -> NDArray[np.bool_]:
-        """Return which of the poses q (P, d) rad are sound, (P,).
+        """Return which of the poses q (P, d) rad, encoder readings of the planned motors, are sound, (P,).
 
-        A sound pose is within the limits and away from blocked poses, violates no clause, and has no contact that `care` forbids.
+        A sound pose is within the limits of the motors, away from the poses in `blocked`, fulfils every clause (a condition on several
+        motor positions, as the shoulder's cables impose), and has no forbidden contact.  `care`: the contacts that are forbidden; "solids":
+        all contacts of solids; "grasping": these, except contacts of the hand with the target; "fields": contacts of solids and of
+        repulsive fields, except those of the hand's fields with the target.  `checked` is increased by P.
         """
         self.checked += len(q)
         poses = self.whole(q)
@@ -95,7 +103,8 @@ class PeerBelief:
     def sound_motion(self, start: Array, end: Array, care: Care = "solids") -> bool:
         """Return whether all poses on the straight path between two poses (d,) rad are sound; the start pose is not checked.
 
-        `care`: the contacts that are forbidden.
+        "Sound" and the values of `care`, the set of forbidden contacts, are explained at `PeerBelief.sound`.  `checked` is increased by the
+        number of checked poses.
         """
         count = max(1, int(np.ceil(np.abs((end - start) / self.span).max() / STEP)))
         shares = np.arange(1, count + 1)[:, None] / count
@@ -125,7 +134,11 @@ class PeerBelief:
         return touching
 
     def push(self, q: Array) -> Array:
-        """Return the norm of the fields' forces J^T f at the motors in each pose q (P, d) rad, (P,); the target does not push the hand."""
+        """Return how strongly the fields push the planned motors in each pose q (P, d) rad, (P,), in m^2/rad.
+
+        Fields are volumes around robot parts and objects that cause repulsive forces.  The result is the norm of the sum of J^T (depth *
+        normal) over the contacts of fields; the target does not push the hand.
+        """
         size: Array = np.linalg.norm(self._evaluate(self.whole(q), reaching=True).projection[:, self.columns], axis=1)
         return size
 
@@ -154,10 +167,11 @@ RETREAT, CLEAR = 0.02, 0.2  # m, step away from the target, and largest distance
 def goals(
     belief: PeerBelief, target: ReachTarget, rng: np.random.Generator, most: int = MAX_POSES, free: bool = False
 ) -> tuple[Array, Array]:
-    """Return poses with the marker on the target, and for each one a pose away from the target, (K, d) rad each, sorted by field forces.
+    """Return sound poses with the marker on the target, and for each of them a pose away from the target, (K, d) rad each; K may be 0.
 
-    From the second pose the hand moves straight to the first.  `most`: largest number of poses; those with the smallest forces of fields
-    are returned.  Poses in which the forces of joint limits act are returned only if there are no others, and never with `free`.
+    From the pose away from the target the hand moves straight to the target.  The poses are sorted by the forces of the fields (volumes
+    that repel), the smallest first.  `rng`: for the random starts of the search.  `most`: largest number of poses.  `free`: return only
+    poses in which no joint limit exerts a force; if it is false, other poses are returned if there are no such poses.
     """
     within = target.radius if target.aim == "surface" else 0.0
     trials = ((belief.limits, ARRIVED), (belief.range, ARRIVED), (belief.range, ALMOST))
@@ -204,10 +218,11 @@ def approach(belief: PeerBelief, starts: Array, place: Array, within: float, lim
 
 
 def retreat(belief: PeerBelief, pose: Array, place: Array) -> Array | None:
-    """Return the first pose (d,) rad on the marker's straight path out of the target that is sound with the care "fields".
+    """Return the first pose (d,) rad on the marker's straight path out of the target that is free of contacts; None if there is none.
 
-    `pose`: (d,) rad, with the marker on the target.  `place`: (3,) m, centre of the target.  If no such pose is found within 0.2 m, the
-    first one that is sound with the care "solids" is returned; None if there is none either.
+    `pose`: (d,) rad, with the marker on the target.  `place`: (3,) m, root frame, centre of the target.  In the returned pose nothing
+    touches, neither solids nor repulsive fields, except the hand's fields with the target.  If there is no such pose within 0.2 m, the
+    first pose in which no solids touch is returned.
     """
     whole = belief.whole(pose)
     here = belief.model.evaluate(whole).position(belief.marker)
@@ -253,8 +268,9 @@ def rrt_connect(
 ) -> Array | None:
     """Return the waypoints (k, d) rad of a sound path from a sound pose to one of several poses; None if none was found.
 
-    `PeerBelief` defines "sound".  `start`: (d,) rad.  `ends`: (G, d) rad.  `care`: the contacts that are forbidden.  `extensions`: largest
-    number of extensions of the trees.  Raises OmplMissing.
+    `PeerBelief` defines "sound".  `start`: (d,) rad.  `ends`: (G, d) rad.  `seed`: seed of the random search.  `care`: the contacts that
+    are forbidden: "solids", "grasping" or "fields", explained at `PeerBelief.sound`.  `extensions`: largest number of extensions of the
+    trees. Raises OmplMissing.
     """
     sound, sound_motion = partial(belief.sound, care=care), partial(belief.sound_motion, care=care)
     checker = _Careful(belief.range[:, 0], belief.span, belief.limits, sound, sound_motion)
@@ -264,8 +280,9 @@ def rrt_connect(
 def shortened(belief: PeerBelief, path: Array, rng: np.random.Generator, care: Care = "solids") -> Array:
     """Return the path (k, d) rad with straight sound motions in place of detours.
 
-    Straight motions are tried between random points on the path, then from each waypoint as far as possible.  `care`: the contacts that are
-    forbidden.
+    Straight motions are tried from each waypoint as far as possible, then between random points on the path, then from each waypoint again.
+    `rng`: for the random points.  `care`: the contacts that are forbidden: "solids", "grasping" or "fields", explained at
+    `PeerBelief.sound`.
     """
     found = _straightened(belief, list(path), care)
     for _ in range(SHORTCUTS if len(found) > 2 else 0):

@@ -74,9 +74,9 @@ class Case:
 def make_cases(scene: str, count: int, seed: int, law: str = "default", free: bool = False) -> list[Case]:
     """Draw `count` random cases of a kind; raises InvalidValue if too few are found.
 
-    The targets are those of `touchable_targets`.  In a start pose no solid touches anything.  `scene`: "free", "around", "against",
-    "between" or "moving", as explained at SCENES.  `law`: "default" with today's robot, or "published" with the robot of 2014.  `free`: in
-    the touching poses of the targets, no joint limit pushes.
+    The targets are drawn from those of `touchable_targets`.  In a start pose no solid touches anything.  `scene`: "free", "around",
+    "against", "between" or "moving", as explained at SCENES.  `seed`: seed of the draws.  `law`: "default" with today's robot, or
+    "published" with the robot of 2014.  `free`: the palm can touch each target in a pose in which no joint limit exerts a force.
     """
     rng = np.random.default_rng([seed, 87, SCENES.index(scene)])
     targets, belief = touchable_targets(law, free), arm_belief(law=law)
@@ -167,10 +167,11 @@ class Attempt:
 
 
 def trained(seed: int, transitions: int, tries: int, law: str = "default", free: bool = False) -> ReachAgent:
-    """Return a reach learner that was trained on the targets of `touchable_targets`, in an empty world.
+    """Return a reach learner that was trained on the 27 targets of `touchable_targets`, in an empty world.
 
-    `transitions`: number of transitions that are learned before.  `tries`: number of problem-tries.  `law`: "default" with today's robot,
-    or "published" with the robot of 2014.  `free`: in the touching poses of the targets, no joint limit pushes.
+    `seed`: seed of the plant and the agent.  `transitions`: number of transitions that the agent learns before it tries to reach.  `tries`:
+    number of problem-tries, each one an attempt to reach one target.  `law`: "default" with today's robot, or "published" with the robot of
+    2014.  `free`: the palm can touch each target in a pose in which no joint limit exerts a force.
     """
     plant = arm_plant(seed + 500, law=law)
     agent = reach_agent(plant, learned_transitions(plant, seed, transitions, law), seed, law)
@@ -181,9 +182,10 @@ def trained(seed: int, transitions: int, tries: int, law: str = "default", free:
 def attempt(method: str, agent: ReachAgent, case: Case, seed: int, motors: MotorParameters | None = None, law: str = "default") -> Attempt:
     """Attempt a case from rest in its start pose, and return the result.
 
-    `method`: "planner": move to a state with the palm near the target, without a reach; "reach": reach from the start; "both": move to the
-    best pre-reach state, then reach.  A reach that misses is repeated, up to REACHES times in all (1 for the law "published", 3 for
-    "default"). `agent`: the trained learner.  `seed`: of the plant and of choices.  `motors`: None: the default ones.
+    `method`: "planner": move to a state with the palm near the target, without a reach; "reach": reach from the start pose; "both": move to
+    the state with the highest expected reward of reaching, then reach.  In a reach, a force pulls the palm to the target.  A reach that
+    misses is repeated, up to REACHES times in all (1 for the law "published", 3 for "default"). `agent`: the trained learner.  `seed`: seed
+    of the plant and of choices.  `motors`: motor parameters; None: the default ones.  `law`: "default" or "published".
     """
     plant = begun(case, seed, motors, law)
     start = plant.time
@@ -211,7 +213,8 @@ def _missing(plant: OfflinePlant, case: Case, start: float) -> float:
 def begun(case: Case, seed: int, motors: MotorParameters | None = None, law: str = "default") -> OfflinePlant:
     """Return a plant in the world of a case, without the target, with the arm at rest in the start pose.
 
-    `seed`: of the plant.  `motors`: None: the default ones.  `law`: "default" with today's robot, or "published" with the robot of 2014.
+    `seed`: seed of the plant's random numbers.  `motors`: motor parameters; None: the default ones.  `law`: "default" with today's robot,
+    or "published" with the robot of 2014.
     """
     plant = arm_plant(seed, case.world(), motors, law)
     place(plant, arm_belief(law=law).whole(case.start))

@@ -24,7 +24,7 @@ MAX_ACTIONS = 10  # of a try, its reach included
 
 @dataclass(frozen=True)
 class Learner:
-    """The kind of a reach learner: names of predictor, strategy and memory of failures, as in `ReachAgent`.
+    """The kind of a reach learner: names of its predictor, strategy and memory of failures, which are arguments of `ReachAgent`.
 
     `cost`: expected duration of a run, relative to the other learners.
     """
@@ -35,7 +35,10 @@ class Learner:
     cost: float = 1.0
 
     def agent(self, *given: Any, **settings: Any) -> ReachAgent:
-        """Return a `ReachAgent` of this kind; the arguments are its other arguments."""
+        """Return a `ReachAgent` with this predictor, strategy and memory of failures.
+
+        `given`, `settings`: the other arguments of `ReachAgent`, by position and by name.
+        """
         return ReachAgent(*given, predictor=self.predictor, strategy=self.strategy, failures=self.failures, **settings)
 
 
@@ -67,9 +70,11 @@ def learn(
 ) -> dict[str, Any]:
     """Let an agent learn from `problems`, and evaluate it on each of the named `sets` at the `checkpoints`, which are numbers of tries.
 
-    Returns arrays by name.  For the T problem-tries: `problem`, `reach_state`, `reward`, `actions`, `duration` [s], each (T,), and
-    `failures` (S, A), the number of failures of each transition.  For each set, with L evaluations of R = `repetitions` repetitions of P
-    problems: `rewards_NAME` and `states_NAME` (L, R, P), and `blocked_NAME` (L,), the number of failed transitions.
+    Returns arrays by name.  A problem-try is one attempt to reach one target.  For each of the T problem-tries, (T,): `problem`: number of
+    the target; `reach_state`: state from which the agent reached, -1 if it did not; `reward`; `actions`: number of actions; `duration` [s].
+    `failures` (S, A): number of failures of each transition.  For each set NAME, with L evaluations of R = `repetitions` repetitions of P
+    problems: `rewards_NAME` (L, R, P): rewards of the reaches, 0 without a reach; `states_NAME` (L, R, P): states from which the agent
+    reached, -1 without a reach; `blocked_NAME` (L,): number of failed transitions.
     """
     tries: list[Try] = []
     found: dict[str, list[Evaluation]] = {name: [] for name in sets}
@@ -87,7 +92,11 @@ def learn(
 
 
 def of_evaluations(name: str, evaluations: Sequence[Evaluation]) -> dict[str, Any]:
-    """Return the arrays `rewards_NAME`, `states_NAME` and `blocked_NAME` of evaluations on the set `name`, as `learn` returns them."""
+    """Return the results of L evaluations on the set `name` as arrays, for R repetitions of P problems.
+
+    Keys: `rewards_NAME` (L, R, P): rewards of the reaches, 0 without a reach; `states_NAME` (L, R, P): states from which the agent reached,
+    -1 without a reach; `blocked_NAME` (L,): number of failed transitions.
+    """
     return {
         f"rewards_{name}": np.array([one.rewards for one in evaluations]),
         f"states_{name}": np.array([one.states for one in evaluations], dtype=np.int16),

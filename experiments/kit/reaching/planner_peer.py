@@ -54,10 +54,10 @@ class PeerMemory:
         self.restore(([], {}))
 
     def blocked(self, aim: Array, end: Array, target: ReachTarget, touched: bool) -> None:
-        """Record that a motion to the pose `aim` ended in another pose `end`, both (d,) rad.
+        """Record that a motion to the pose `aim` ended in another pose `end`, both (d,) rad, and avoid a pose near its end.
 
-        The pose at a small distance ahead of `end` towards `aim` is avoided, or `aim` if it is nearer.  `touched`: whether the target was
-        touched; the pose is then avoided only for this target.
+        This pose is ahead of `end` towards `aim`, at the distance 0.08, where each motor's difference is a share of its range, or it is
+        `aim` if that is nearer.  `touched`: whether the target was touched; the pose is then avoided only for this target.
         """
         left = (aim - end) / self._span
         ahead = end + min(1.0, NEAR / max(float(np.linalg.norm(left)), 1e-9)) * (aim - end)
@@ -89,7 +89,7 @@ ESCAPES = 64  # random poses, to get away from a contact
 class PeerPlans:
     """Plans paths to targets with the planner's belief about robot and world.
 
-    The goal poses of each target are kept; new ones are drawn if the avoided poses leave no path.  `seed`: of random goals and paths.
+    The goal poses of each target are kept; new ones are drawn if the avoided poses leave no path.  `seed`: seed of random goals and paths.
     """
 
     def __init__(self, belief: PeerBelief, seed: int) -> None:

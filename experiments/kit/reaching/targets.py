@@ -44,7 +44,10 @@ def between() -> Array:
 
 
 def targets_at(places: Array, aim: Aim = "centre") -> list[ReachTarget]:
-    """Return spheres as targets, with the default radius (5 cm), at `places` (P, 3) m, root frame."""
+    """Return spheres as targets, with the default radius (5 cm), at `places` (P, 3) m, root frame.
+
+    `aim`: whether a reach aims at the "centre" or the "surface" of the target.
+    """
     return [ReachTarget(place, aim=aim) for place in places]
 
 
@@ -65,9 +68,10 @@ def nearest_pose(
 ) -> Nearest:
     """Return the pose that brings the marker nearest to a place (3,) m, root frame, by least squares (SLSQP) from random poses.
 
-    Contacts are ignored.  The motors `joints` move within their limits, all others are at home.  The clauses of their part hold, unlike in
-    `mobee.roadmap.reachable`.  `restarts`: number of start poses.  `good`: m, distance at which the search ends.  If no start pose gives a
-    pose that satisfies the clauses, the result is home with an infinite distance.
+    Contacts are ignored.  The motors `joints`, all of one part, move within their limits; all other motors are at home.  The clauses of
+    this part, which are the constraints of the shoulder's cables, must hold, unlike in `mobee.roadmap.reachable`.  `restarts`: largest
+    number of start poses.  `seed`: seed of the start poses.  `good`: m, distance at which the search ends.  If no start pose gives a pose
+    that satisfies the clauses, the result is home with an infinite distance.
     """
     from scipy.optimize import minimize  # 0.3 s, and only this needs it
 
@@ -144,11 +148,11 @@ def counts(found: list[float]) -> tuple[int, int]:
 
 @cache
 def touchable_targets(law: str = "default", free: bool = True) -> tuple[ReachTarget, ...]:
-    """Return 27 targets that the right palm can touch in an empty world.
+    """Return 27 targets that the right palm can touch in an empty world; every call returns the same object.
 
-    These are the thesis' targets that it can touch, and random ones within the same box in place of the others.  In the touching pose only
-    the hand's solid is in the target, cable constraints hold, and, if `free`, no joint limit pushes.  `law`: "default" with today's robot,
-    or "published" with the robot of 2014.
+    These are the thesis' targets that the palm can touch, and random targets within the same box in place of the others.  The palm touches
+    a target in a pose in which only the hand's solid is in the target, and cable constraints hold.  `law`: "default" with today's robot, or
+    "published" with the robot of 2014.  `free`: in this pose no joint limit exerts a force.
     """
     belief, rng, places, aim = arm_belief(law=law), np.random.default_rng(27), grid(), laws()[law].aim
     found = [target for target in targets_at(places, aim) if touchable(belief, target, free)]
@@ -159,7 +163,10 @@ def touchable_targets(law: str = "default", free: bool = True) -> tuple[ReachTar
 
 
 def touchable(belief: PeerBelief, target: ReachTarget, free: bool = True) -> bool:
-    """Return whether the marker of a belief can touch the surface of a target; `free`: in a pose in which no joint limit pushes."""
+    """Return whether the marker can touch the surface of a target in the planner's model `belief`, into which the target is put.
+
+    `free`: whether this must be possible in a pose in which no joint limit exerts a force.
+    """
     to_surface = replace(target, aim="surface")
     belief.present(to_surface)
     return len(goals(belief, to_surface, np.random.default_rng(0), most=1, free=free)[0]) > 0

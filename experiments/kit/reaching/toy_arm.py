@@ -117,7 +117,7 @@ SURE_FAILURES = 20  # failures after which an action is not tried again
 class ToyArm(ReachTable):
     """The lattice of the right arm, 81 states, as a `mobee.learning.reaching.tabular.ReachTable` with the reaches of the toy arm.
 
-    `seed`: of the random outcomes.  `start`: the first state.
+    `seed`: seed of the random outcomes.  `start`: the first state.
     """
 
     def __init__(self, seed: int = 0, start: int = 0) -> None:
@@ -139,7 +139,7 @@ class ToyArm(ReachTable):
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
         """Return the outcome of a reach for the presented target, from one of 8 noisy start poses in the present state.
 
-        As in `mobee.reach.ReachPlant.reach`; raises InvalidValue if no target is presented.
+        `part`, `marker` and `stay` are arguments of `mobee.reach.ReachPlant.reach`.  Raises InvalidValue if no target is presented.
         """
         if self._presented is None:
             raise InvalidValue("nothing to reach for: present a target first.")
@@ -183,7 +183,10 @@ def toy_agent(arm: ToyArm, seed: int, predictor: Any, strategy: str, failures: s
 
 
 def oracle(targets: list[ReachTarget], seed: int = 0) -> ReachAgent:
-    """Return an agent that knows all mean rewards and the actions that `targets` block, on its own toy arm; it is only to be evaluated."""
+    """Return an agent that knows all mean rewards and the actions that `targets` block, on a toy arm of its own.
+
+    It is meant to be evaluated, not to learn.  `seed`: seed of arm and agent.
+    """
     agent = toy_agent(ToyArm(seed), seed, Truth(), "greedy", "local")
     for target in targets:
         for state, action in np.argwhere(blocked(target.position)).tolist():
@@ -271,10 +274,11 @@ ROWS = (
 
 
 def scores(predictor: str, strategy: str, failures: str, seed: int, checkpoints: Sequence[int] = CHECKPOINTS) -> tuple[Array, float]:
-    """Return the rewards of a learner as fractions of the oracle's: on the 27 targets at each checkpoint, and on eight that it never tries.
+    """Return the rewards of a learner as fractions of the oracle's: on the 27 targets at each checkpoint (L,), and on eight other targets.
 
-    `predictor`, `strategy`, `failures`: of the learner, as in `ReachAgent`.  `checkpoints`: numbers of problem-tries.  The second result is
-    measured after 800 problem-tries; NaN if this is no checkpoint.
+    `predictor`, `strategy`, `failures`: arguments of `ReachAgent`.  `seed`: seed of arm and learner.  `checkpoints`: L numbers of
+    problem-tries (attempts to reach one target), ascending.  The learner never tries the eight other targets; it is evaluated on them after
+    800 problem-tries; the second result is NaN if 800 is no checkpoint.
     """
     problems, unseen = grid(), np.nan
     agent = toy_agent(ToyArm(seed), seed, predictor, strategy, failures)

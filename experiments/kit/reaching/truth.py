@@ -96,7 +96,7 @@ def truth_of(measured: Mapping[tuple[float, ...], Mapping[str, Any]]) -> Truth:
 def measure(place: Array, law: str = "published", tries: int = TRIES, seed: int = SEED) -> Tried:
     """Try every reach and every transition `tries` times, with the target at a place (3,) m, root frame, and return the results.
 
-    `law`: "published" or "default"; the robot is that of 2014.  `seed`: of the plant and of random choices.
+    `law`: "published" or "default"; the robot is that of 2014.  `seed`: seed of the plant and of random choices.
     """
     target = ReachTarget(place, aim=laws()[law].aim)
     return _Measuring(reach_space(), reach_plant(seed, law), target, tries, seed).run()

@@ -113,9 +113,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Train the learners offline, refine them live, let all contestants try, and return the results.
+    """Train the learners offline, refine them live, let learner and planner try to reach the targets, and return the results.
 
-    Blocks of tries that are already in the folder are not repeated.  Raises OmplMissing before the first block.
+    The tries are made in blocks, one for each launch; blocks that are already in the folder are not repeated.  Raises OmplMissing before
+    the first block.
     """
     require_ompl()
     sizes, starts = QUICK if arguments.quick else Sizes(), 1 if arguments.quick else arguments.starts

@@ -123,9 +123,10 @@ class Ended:
 
 
 def contestant(hand: Hand, job: Job, mover: Mover | None) -> Callable[[Problem], Ended]:
-    """Return a function that lets the contestant of a job attempt a problem; what it needs is loaded before.
+    """Return a function that lets the contestant of a job attempt a problem.
 
-    `mover`: moves the target or the obstacle during an attempt; None: nothing moves.
+    A learner is loaded, with its predictions for the job's targets, before this returns.  In a job of the kind "first motion", `hand` times
+    the first motions from now on.  `mover`: moves the target or the obstacle during an attempt; None: nothing moves.
     """
     if job.kind == "peer":
         return partial(planned, hand, job.seed)
@@ -162,7 +163,10 @@ def learned(hand: Hand, agent: ReachAgent, seed: int, mover: Mover | None, probl
 
 
 def learned_offline(job: Job) -> Block:
-    """Make the tries of `learned` on the offline plant, with the learner that was refined live; returns the block of tries."""
+    """Let the learner that was refined live attempt the problems of a job on the offline plant, and return the block of tries.
+
+    It attempts them as in `learned`.  Contacts are not recorded, so the block has none.  The learner learns nothing.
+    """
     plant, tries = offline_plant(job.seed), list[Judged]()
     agent = load_reaches(job.store, plant, PART)
     for problem in job.problems:

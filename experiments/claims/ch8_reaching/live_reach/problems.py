@@ -93,8 +93,8 @@ class Problem(Struct, frozen=True):
 
     kind: str
     number: int
-    position: list[float]  # m, root frame
-    start: list[float]  # rad
+    position: list[float]
+    start: list[float]
     path: list[list[float]] | None = None
     """The two positions, m, root frame, between which the target or an obstacle moves back and forth; None: nothing moves."""
 

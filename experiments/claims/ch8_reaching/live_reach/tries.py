@@ -59,29 +59,30 @@ class Job(Struct, frozen=True):
 
 
 class Tried(Struct, frozen=True):
-    """The record of one try by the contestant; all times are ticks of robot_sim.
+    """The record of one try by the contestant; ticks are those of robot_sim.
 
-    `kind`, `number`: of the problem.  `out`: start towards the first posture.  `begin`: presentation of the target.  `ends`: ends of the
-    reaches, or the tick at which the planner had finished.  `over`: the arm is at rest again.  `off`: error of the first posture, rad.
-    `actions`: number, reaches included.  `believed`: distance from the target's surface at the end by the encoders, m.  `thinking`:
-    processor time for plans, s.  `why`: reason if the try was interrupted.  `asked`: last request.  `there`: position of a moving target at
-    the last end, m.  `first`: ticks from the last request to the first command that moves; -1: not timed.
+    `kind`, `number`: of the problem.  `out`: tick at which the arm started towards its first posture.  `begin`: tick at which the target
+    was presented.  `ends`: ticks at which a reach ended, or the planner had finished.  `over`: tick at which the arm was at rest again.
+    `off`: error of the first posture, rad.  `actions`: number of actions, reaches included.  `believed`: distance from the target's surface
+    at the end by the encoders, m.  `thinking`: processor time for plans, s.  `why`: reason if the try ended without a reach.  `asked`: tick
+    of the last request.  `there`: position of a moving target at the last of the ends, m.  `first`: ticks from the last request to the
+    first command that moves the arm; -1: not timed.
     """
 
     kind: str
     number: int
-    out: int  # tick at which the arm started towards its first posture
-    begin: int  # tick at which the target was presented
-    ends: list[int]  # ticks at which a reach ended, or the planner had finished
-    over: int  # tick at which the arm was at rest again
-    off: float  # rad, error of the first posture
+    out: int
+    begin: int
+    ends: list[int]
+    over: int
+    off: float
     actions: int
-    believed: float  # m, remaining error at the end, by the encoders
-    thinking: float  # s of processor time for plans
-    why: str = ""  # reason if it ended without a reach
-    asked: int = 0  # tick of the last request
-    there: list[float] | None = None  # m, position of a moving target at the last of the ends
-    first: int = -1  # ticks from the last request to the first command that moves; -1: not timed
+    believed: float
+    thinking: float
+    why: str = ""
+    asked: int = 0
+    there: list[float] | None = None
+    first: int = -1
 
 
 class Judged(Struct, frozen=True):
@@ -96,18 +97,18 @@ class Judged(Struct, frozen=True):
 
     kind: str
     number: int
-    position: list[float]  # m
-    off: float  # m, distance from the target's surface at the last end
+    position: list[float]
+    off: float
     success: bool
     seconds: float  # robot time from the presentation to that moment
     actions: int
     reaches: int
-    thinking: float  # s of processor time for plans
+    thinking: float
     deep: list[Touch]  # contacts of solids deeper than 2 mm, from the start at home until the arm is at rest again
-    begun_off: float  # rad, error of the first posture
-    why: str  # reason if it ended without a reach
-    first: int  # ticks from the request to the first command that moves; -1: not timed
-    first_motion: int  # ticks from the request to the first motion of a joint; -1: not timed
+    begun_off: float
+    why: str
+    first: int
+    first_motion: int
 
 
 class Block(Struct, frozen=True):
@@ -118,11 +119,11 @@ class Block(Struct, frozen=True):
     """
 
     kind: str
-    rate: float  # Hz
-    seconds: float  # of robot time
+    rate: float
+    seconds: float
     repeatable: bool
     tries: list[Judged]
-    deep: list[Touch]  # solid contacts deeper than 2 mm, of the whole block
+    deep: list[Touch]
 
 
 def measure(folder: Path, job: Job, rate: float, repeatable: bool) -> Block:
