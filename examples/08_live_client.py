@@ -50,12 +50,14 @@ def own_system() -> Iterator[str]:
 
 
 def watch(endpoint: str) -> None:
-    """Connect, wait until the left arm moves, and print its state."""
+    """Connect, wait until the agent moves the left arm, and print its state."""
     with Service(f"client_{os.getpid()}", ServiceConfig(endpoint=endpoint), robot) as service:
         states: deque[State] = deque(maxlen=1000)
 
         service.on_newest(State, states.append, "left_arm")
         service.on_clock(lambda clock: None)  # gives the run: messages of another run are refused
+        service.spin(time.monotonic() + PATIENCE, lambda: bool(service.alive.get("agent_left_arm")))
+        states.clear()
         service.spin(time.monotonic() + PATIENCE, lambda: len(states) > 0 and np.ptp([states[0].q, states[-1].q], axis=0).max() > 0.1)
         if not states:
             raise SystemExit(f"nothing from the left arm within {PATIENCE:g} s: is a robot running at {endpoint}?")

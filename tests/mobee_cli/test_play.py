@@ -75,7 +75,7 @@ def test_a_ctrl_c_during_learning_keeps_all_transitions(tmp_path: Path, capsys: 
 
     watcher = threading.Thread(target=interrupt)
     watcher.start()
-    assert main(["play", str(arm), "--offline-only", "--transitions", "20000", "--save", str(store.parent)]) == 130
+    assert main(["play", str(arm), "--offline-only", "--transitions", "10000000", "--save", str(store.parent)]) == 130
     watcher.join()
     said = capsys.readouterr().err
     assert f"{kept(store)} transitions are kept, and `mobee launch {store.with_suffix('.toml')}` continues live with them" in said
