@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A robot_sim of your own: puts a hobby arm, or any motors that take positions, on the bus in the place of the simulated robot.
 
-`Servos` is the hardware; its servos are simulated here. To drive real ones, change `exchange` and `stop`. The safety gate, the ownership
-of parts and the emergency stop are those of the shipped robot_sim, and must stay between the bus and the motors.
+`Servos` is the hardware; its servos are simulated here. To drive real ones, change its method `exchange`. The safety gate, the
+ownership of parts and the emergency stop are those of the shipped robot_sim, and must stay between the bus and the motors.
 
     mobee router                                             # each in a terminal of its own
     python examples/bus/own_robot.py --robot my_arm.xml

@@ -2,9 +2,9 @@
 """Start-up: import, first pose and start of the whole system, in time and memory.
 
 Claim: `import mobee` takes at most 0.2 s, and the first pose with its contacts at most 0.3 s from the start of Python; the default system
-without its page is ready within 3 s and takes at most 500 MB (PSS: memory that processes share counts once).  The processor times of the
+without its page is ready within 3 s and takes at most 500 MiB (PSS: memory that processes share counts once).  The processor times of the
 library are judged as multiples of the time to import NumPy, each in a fresh process, by turns.  The time of the system is judged by the
-calibration loop in two processes at once.  Memory is judged in MB.  Run time: half a minute.
+calibration loop in two processes at once.  Memory is judged in MiB.  Run time: half a minute.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ REQUIREMENTS = (
     Requirement(f"{IMPORT}, times NumPy's import", ("times_numpy", IMPORT), at_most=0.2 / _NUMPY_SECONDS),
     Requirement(f"{POSE}, times NumPy's import", ("times_numpy", POSE), at_most=0.3 / _NUMPY_SECONDS),
     Requirement("system ready, s", ("system", "standard_ready_s"), at_most=3.0),
-    Requirement("system, MB", ("system", "total_megabytes"), at_most=500.0),
+    Requirement("system, MiB", ("system", "total_mebibytes"), at_most=500.0),
 )
 _PROGRAMS = {
     NUMPY: "import numpy",
@@ -60,11 +60,12 @@ QUICK = Settings(rounds=5, systems=1)
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """Run this benchmark and return its result; raises LaunchFailed.
+    """Run this benchmark and return its result; raises LaunchFailed if a system does not start.
 
-    Keys: "wall_s" and "processor_s", median times [s] by program; "times_numpy", processor time over that of importing NumPy; "system",
-    times until the system is ready [s] and memory [MB]; "requirements", the list of judged requirements, each a dict; "passed", whether all
-    are met.
+    Keys: "wall_s" and "processor_s", dicts from a program to its median wall and processor time [s]; "times_numpy", processor time over
+    that of importing NumPy, by program; "system", a dict with the times until the system is ready ("ready_s", "standard_ready_s") and its
+    memory [MiB] ("mebibytes" by process, "total_mebibytes"); "requirements", a list with the dict that `Requirement.judge` returns for each
+    requirement; "passed", whether all are met.
     """
     rounds: list[dict[str, tuple[float, float]]] = []
     systems: list[dict[str, Any]] = []
@@ -87,18 +88,18 @@ def summarized(rounds: list[dict[str, tuple[float, float]]], systems: list[dict[
     the system.
 
     Keys: "wall_s" and "processor_s", median times [s] by program; "times_numpy", processor time over that of importing NumPy; "system", a
-    dict with the times until it is ready [s] and memory [MB]; "requirements", the list of judged requirements, each a dict; "passed",
-    whether all are met.
+    dict with the times until it is ready [s] and memory [MiB]; "requirements", a list with the dict that `Requirement.judge` returns for
+    each requirement; "passed", whether all are met.
     """
     wall, own = ({name: np.array([one[name][which] for one in rounds]) for name in _PROGRAMS} for which in (0, 1))
     ratios = {name: float(np.median(own[name] / own[NUMPY])) for name in (IMPORT, POSE)}
     system: dict[str, Any] = {name: float(np.median([one[name] for one in systems])) for name in ("ready_s", "standard_ready_s", "speed")}
     processes: dict[str, list[float]] = {}
     for one in systems:
-        for service, size in one["megabytes"].items():
+        for service, size in one["mebibytes"].items():
             processes.setdefault(service, []).append(size)
-    system["megabytes"] = {service: float(np.median(sizes)) for service, sizes in processes.items()}
-    system["total_megabytes"] = sum(system["megabytes"].values())
+    system["mebibytes"] = {service: float(np.median(sizes)) for service, sizes in processes.items()}
+    system["total_mebibytes"] = sum(system["mebibytes"].values())
     result = {
         "wall_s": {name: float(np.median(values)) for name, values in wall.items()},
         "processor_s": {name: float(np.median(values)) for name, values in own.items()},
@@ -116,21 +117,21 @@ def _times_in_new_process(program: str) -> tuple[float, float]:
 
 
 def _system(seconds: float, speeds: Calibration) -> dict[str, Any]:
-    """Start the default system without its page; returns the time until it was ready [s], and PSS [MB] of each process at the end."""
+    """Start the default system without its page; returns the time until it was ready [s], and PSS [MiB] of each process at the end."""
     newest: dict[str, float] = {}
 
     def update(launcher: int) -> None:
-        found = megabytes(launcher)
+        found = mebibytes(launcher)
         if len(found) >= len(newest):  # fewer: it is ending
             newest.update(found)
 
     summary, speed = speeds.around(lambda: summary_of("default", duration=seconds, watch=update))
     ready = float(summary["seconds_to_ready"])
-    return {"ready_s": ready, "standard_ready_s": ready * speed, "speed": speed, "megabytes": newest}
+    return {"ready_s": ready, "standard_ready_s": ready * speed, "speed": speed, "mebibytes": newest}
 
 
-def megabytes(launcher: int) -> dict[str, float]:
-    """Return the memory [MB] of a launcher and of the services it has started, by name.
+def mebibytes(launcher: int) -> dict[str, float]:
+    """Return the memory [MiB] of a launcher and of the services it has started, by name.
 
     `launcher`: process id.  The memory is the PSS: memory that n processes share counts 1/n for each.  A process that has ended is absent.
     """
@@ -139,8 +140,8 @@ def megabytes(launcher: int) -> dict[str, float]:
         with contextlib.suppress(OSError, StopIteration):  # the process has ended meanwhile
             words = Path(f"/proc/{pid}/cmdline").read_bytes().decode().split("\0")
             lines = Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()
-            kilobytes = next(int(line.split()[1]) for line in lines if line.startswith("Pss:"))
-            found["launcher" if pid == launcher else _service_name(words)] = kilobytes / 1024.0
+            kibibytes = next(int(line.split()[1]) for line in lines if line.startswith("Pss:"))
+            found["launcher" if pid == launcher else _service_name(words)] = kibibytes / 1024.0
     return found
 
 
@@ -166,6 +167,6 @@ def report(result: Mapping[str, Any]) -> str:
         times = f"{result['times_numpy'][name]:.2f}" if name in result["times_numpy"] else ""
         lines.append(f"  {name:<28}{wall:>9.3f}{result['processor_s'][name]:>14.3f}{times:>9}")
     system = result["system"]
-    lines.append(f"default system without its page: ready after {system['ready_s']:.1f} s, {system['total_megabytes']:.0f} MB:")
-    lines.append("  " + ", ".join(f"{service} {size:.0f}" for service, size in system["megabytes"].items()))
+    lines.append(f"default system without its page: ready after {system['ready_s']:.1f} s, {system['total_mebibytes']:.0f} MiB:")
+    lines.append("  " + ", ".join(f"{service} {size:.0f}" for service, size in system["mebibytes"].items()))
     return report_text(lines, result, system["speed"])

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mobee.errors import MobeeError
 from mobee.model.world import World
-from mobee.model.world_object import Geometry, WorldObject
+from mobee.model.world_object import FRICTION, Geometry, WorldObject
 from mobee.robot.robot import Robot, Shape, per_robot
 
 _DIGITS, _DECIMALS = 16, 9
@@ -87,7 +87,8 @@ def world_as_json(world: World) -> list[dict[str, Any]]:
     Each object is a dict: "name"; "kind" and "size" (list of lengths in m) of its shape, as in `mobee.model.world_object.Geometry`;
     "position" (3 numbers, m) and "rotation" (3 rows of 3 numbers), in the root frame, or in the frame of the link that carries the object;
     "role": "obstacle", "target" or "ghost"; "color": red, green, blue and opacity, each 0 to 1, or None; "link": name of the link that
-    carries the object, or None. Mass and friction are not included.
+    carries the object, or None. "mass" [kg] is included only for an object that has one, and "friction" only if it is not the usual 0.5:
+    earlier versions of this library do not know these two, and ignore them.
     """
     return [
         {
@@ -99,6 +100,8 @@ def world_as_json(world: World) -> list[dict[str, Any]]:
             "role": one.role,
             "color": one.color,
             "link": one.link,
+            **({} if one.mass is None else {"mass": one.mass}),
+            **({} if one.friction == FRICTION else {"friction": one.friction}),
         }
         for one in world.objects.values()
     ]
@@ -110,10 +113,10 @@ def world_from_json(objects: Sequence[dict[str, Any]]) -> World:
     for one in objects:
         place = {"position": one["position"], "rotation": one["rotation"]}
         shape = Geometry(one["kind"], tuple(one["size"]))
-        if one["link"] is None:
-            world.add(one["name"], shape, role=one["role"], color=one["color"], **place)
-        else:
-            world.add(one["name"], shape, role=one["role"], color=one["color"])
+        free = place if one["link"] is None else {}
+        pushed = {"mass": one.get("mass"), "friction": one.get("friction", FRICTION)}
+        world.add(one["name"], shape, role=one["role"], color=one["color"], **free, **pushed)
+        if one["link"] is not None:
             world.attach(one["name"], one["link"], (one["position"], one["rotation"]))
     return world
 

@@ -26,7 +26,8 @@ from services.common.service import Service
 _JOIN = 2.0  # s until tokens and streams arrive
 _NOTES = """Run `mobee router` and your robot_sim, without a controller. The verb moves the
 first motor of a part by about 5 degrees towards the middle of its range, again
-and again: be ready to switch a real robot off. The contract: docs/hardware.md.
+and again, and for the check model-gone it arms all parts: be ready to switch a
+real robot off. The contract: docs/hardware.md.
 Exit code: 0 all rules are kept, 1 a rule is broken, 2 bad input, 3 no robot."""
 
 

@@ -7,7 +7,7 @@ A check is a function of a player, which acts as the controller, and of the part
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -15,12 +15,13 @@ from typing import Any
 import numpy as np
 
 from bus_schema import keys
-from bus_schema.messages import EStop, Mode, State
+from bus_schema.messages import EStop, Mode, Order, State
 from bus_schema.rpc import Config, Done, Empty, PartMeta, Pulse
 from mobee.arrays import Array
 from mobee_cli.conform.player import ANSWER, TTL, Broken, Player
 from services.common.rpc import CallFailed
 from services.common.worlds import robot_hash
+from services.robot_sim.sensors import part_meta
 
 OBSERVED = 1.5  # s for which the streams are recorded
 MISSING = 0.1  # share of the ticks that may not arrive
@@ -64,7 +65,7 @@ def service(player: Player, part: str) -> None:
 
 
 def parts(player: Player, part: str) -> None:
-    """Test that the parts, their motors and the hash of the robot are those of the robot file; raises Broken otherwise."""
+    """Test that the parts, their motors, the limits and the robot's hash are those of the robot file; raises Broken otherwise."""
     robot = player.robot
     if set(player.tick.parts) != set(robot.parts):
         raise Broken(f"a tick has the parts {', '.join(player.tick.parts)}; the robot file has {', '.join(robot.parts)}")
@@ -74,6 +75,7 @@ def parts(player: Player, part: str) -> None:
             raise Broken(f"{name}/meta has the motors {', '.join(meta.motors)}; in the robot file their order is {', '.join(own.motors)}")
         if meta.robot_hash != robot_hash(robot):
             raise Broken(f"{name}/meta has robot_hash {meta.robot_hash}, the robot file {robot_hash(robot)}: give both the same --robot")
+        _require_limits(meta, part_meta(robot, name))
 
 
 def streams(player: Player, part: str) -> None:
@@ -209,12 +211,15 @@ def watchdog(player: Player, part: str) -> None:
 
 def owner_gone(player: Player, part: str) -> None:
     """Test that a part goes into hold when the liveliness token of its owner disappears; raises Broken otherwise."""
-    _hold_without(player, part, "controller", owner=True)
+    _hold_without(player, [part], "controller", owner=True)
 
 
 def model_gone(player: Player, part: str) -> None:
-    """Test that the part goes into hold when the liveliness token of the model disappears; raises Broken otherwise."""
-    _hold_without(player, part, "model", owner=False)
+    """Test that all parts go into hold when the liveliness token of the model disappears; raises Broken otherwise.
+
+    All parts are armed; `part` moves, and the others are commanded not to move.
+    """
+    _hold_without(player, [part, *(name for name in player.robot.parts if name != part)], "model", owner=False)
 
 
 def emergency_stop(player: Player, part: str) -> None:
@@ -321,24 +326,42 @@ def _require_ignored(player: Player, part: str, what: str, send: Callable[[], in
         raise Broken(f"a command {what} is obeyed")
 
 
-def _hold_without(player: Player, part: str, who: str, owner: bool) -> None:
-    """Require that an armed part holds when the token of a service disappears; the other commands continue."""
+def _hold_without(player: Player, parts: Sequence[str], who: str, owner: bool) -> None:
+    """Require that armed parts hold when the token of a service disappears; the commands, which move the first part, continue.
+
+    `owner`: whether the service is the owner of the parts.
+    """
     session, instance = player.service.bus.session, f"i0_conform_{who}"
     token: Any = session.liveliness().declare_token(keys.alive(who, instance))
     try:
         player.wait(0.1)
-        player.drive(part, "release", player.take(part))
-        player.take(part, instance=instance if owner else "")
-        player.drive(part, "arm")
-        player.keep(part, "velocity", lambda: _speed(player, part), MOTION)
-        gate = player.status(part).gate
+        for part in parts:
+            player.drive(part, "release", player.take(part))
+            player.take(part, instance=instance if owner else "")
+            player.drive(part, "arm")
+        orders = {part: Order(player.epochs[part], "velocity") for part in parts}
+        player.keep(parts[0], "velocity", lambda: _speed(player, parts[0]), MOTION, parts=orders)
+        gates = {part: player.status(part).gate for part in parts}
     finally:
         token.undeclare()
-    if gate != "armed":
-        raise Broken(f"under valid commands the gate is {gate!r}, expected 'armed'")
-    player.keep(part, "velocity", lambda: _speed(player, part), STOP_TIME)
-    gate = player.status(part).gate
-    player.take(part)
-    player.drive(part, "release")
-    if gate == "armed":
-        raise Broken(f"{STOP_TIME:g} s after the token alive/{who}/... is gone the part is still armed")
+    for part, gate in gates.items():
+        if gate != "armed":
+            raise Broken(f"under valid commands the gate of {part} is {gate!r}, expected 'armed'")
+    player.keep(parts[0], "velocity", lambda: _speed(player, parts[0]), STOP_TIME, parts=orders)
+    armed = [part for part in parts if player.status(part).gate == "armed"]
+    for part in parts:
+        player.take(part)
+        player.drive(part, "release")
+    if armed:
+        raise Broken(f"{STOP_TIME:g} s after the token alive/{who}/... is gone these parts are still armed: {', '.join(armed)}")
+
+
+def _require_limits(meta: PartMeta, ours: PartMeta) -> None:
+    """Raise Broken if limits of a part differ from `ours`, those of the robot file, by more than a rounding error."""
+    for limit in ("lower", "upper", "max_velocity", "max_acceleration", "max_torque"):
+        found, expected = getattr(meta, limit), getattr(ours, limit)
+        if len(found) != len(expected):
+            raise Broken(f"{ours.part}/meta has {len(found)} values of {limit}, expected {len(expected)}")
+        for motor, one, other in zip(ours.motors, found, expected, strict=True):
+            if not math.isclose(one, other, rel_tol=1e-5, abs_tol=1e-8):
+                raise Broken(f"{ours.part}/meta has {limit} {one:g} of {motor}; in the robot file it is {other:g}")

@@ -197,15 +197,15 @@ class Player:
         self.service.bus.session.put(Commands.stream.key(), encode(message), encoding=encoding_of(Commands))
         return message.seq
 
-    def keep(self, part: str, mode: Mode, ref: Callable[[], Array], seconds: float) -> None:
+    def keep(self, part: str, mode: Mode, ref: Callable[[], Array], seconds: float, **changed: Any) -> None:
         """For `seconds` s, answer every tick with a valid command to a part.
 
-        `ref`: returns the position [rad] or velocity [rad/s] to command, (n_part,), by `mode`.
+        `ref`: returns the position [rad] or velocity [rad/s] to command, (n_part,), by `mode`. `changed`: as of `send`.
         """
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             seen = self.tick.k
-            self.send(part, mode, ref())
+            self.send(part, mode, ref(), **changed)
             self.until(partial(self._is_after, seen), ANSWER)
 
     def _is_after(self, k: int) -> bool:

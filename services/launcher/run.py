@@ -150,6 +150,7 @@ def _launch(options: Options, open_meanwhile: contextlib.ExitStack) -> int:
         return _refuse(str(error), ENVIRONMENT)
     except KeyboardInterrupt:
         return _refuse("interrupted before any service was started", INTERRUPTED)
+    open_meanwhile.enter_context(bus.session)  # closed although there is no service, if one of the following files cannot be written
     try:
         directory = make_run_directory(options.runs, here, bus.endpoint)
         record = _stop_record(bus, scenario, here)
@@ -255,7 +256,10 @@ class _Run:
             service.on_alive(self._note_router)
 
     def execute(self, started: float) -> int:
-        """Start, supervise and stop the services, and report; return the exit code; `started`: monotonic time of the launch [s]."""
+        """Start, supervise and stop the services, and report; return the exit code.
+
+        `started`: monotonic time at which the launch began [s].
+        """
         self._handle_signals()
         self._service.describe = self._describe
         self._service.ready()

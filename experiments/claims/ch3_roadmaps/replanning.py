@@ -16,7 +16,7 @@ a command computed after the new goal is in force.  Also measured: when the join
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -77,7 +77,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
     """Make the crossings that are not in `folder` yet, in launches of five, and return the results of all crossings.
 
-    In a crossing, the arm moves from the right of a ball to its left, and the ball becomes solid during the motion.
+    A launch is one run of the system.  In a crossing, the arm moves from the right of a ball to its left, and the ball becomes solid during
+    the motion.
     """
     count = QUICK_CROSSINGS if arguments.quick else arguments.crossings
     after = np.random.default_rng([arguments.seed, 432]).uniform(SOONEST, LATEST, count)
@@ -96,9 +97,9 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 def results(folder: Path) -> dict[str, Any]:
-    """Return the counts, times and judged claims of the measured crossings in `folder`; raises InvalidValue if there are none.
+    """Compute the results of the measured crossings in `folder`, as `findings` returns them; raises InvalidValue if there are none.
 
-    The keys are those of `findings`.
+    Keys: "live", a dict of counts and times; "claims", a list with the judged claims, as dicts (`Claim.record`).
     """
     return findings(_crossings(folder))
 
@@ -106,8 +107,8 @@ def results(folder: Path) -> dict[str, Any]:
 def cross(folder: Path, job: Job, seed: int, lockstep: bool = False, backend: str = PHYSICS[0]) -> dict[str, Any]:
     """Launch a system that makes and records the crossings of a job in `folder`, and return the launcher's summary of the run.
 
-    `seed`: of the simulated robot.  `lockstep`: True: every tick waits for all services; False: ticks follow the clock.  `backend`: physics
-    engine, "pybullet" or "mujoco".  Raises LaunchFailed.
+    `job`: the crossings.  `seed`: of the simulated robot.  `lockstep`: True: every tick waits for all services; False: ticks follow the
+    clock.  `backend`: physics engine, "pybullet" or "mujoco".  Raises LaunchFailed if the system fails or does not end.
     """
     write_job(folder, job)
     names = {"world": str(WORLD), "simulated": str(SIMULATED), "backend": backend}
@@ -143,7 +144,10 @@ class Measures(Struct, frozen=True):
 
 
 def measure(folder: Path) -> list[Measures]:
-    """Compute the measures of all crossings of a launch from its recording, and write them into its folder."""
+    """Compute the measures of each crossing of a launch from its recording, write them into its folder, and return them in order.
+
+    A launch is one run of the system, with a few crossings.  `folder`: folder of the launch.
+    """
     q = read_positions(folder, robot())
     touches = [touch for touch in read_touches(folder / CONTACTS, 1.0 / RATE) if BALL in touch.pair]
     found = []
@@ -156,12 +160,15 @@ def measure(folder: Path) -> list[Measures]:
 
 
 def read_measured(folder: Path) -> list[Measures]:
-    """Read the measures that `measure` wrote into the folder of a launch."""
+    """Read the measures of each crossing of a launch, in order, from the file that `measure` wrote into the folder of the launch.
+
+    A launch is one run of the system, with a few crossings.
+    """
     return decoded((folder / MEASURED).read_text(), list[Measures])
 
 
 def keep_poses(folder: Path) -> None:
-    """Save poses of the first crossing of a launch for pictures, in poses.npz of its folder.
+    """Save poses of the first crossing of a launch (one run of the system) for pictures, in poses.npz of its folder.
 
     It contains `q` (T, n) rad, `times` (T,) s, and the times [s] `solid` (the ball becomes solid) and `bump` (the arm touches it).
     """
@@ -169,6 +176,15 @@ def keep_poses(folder: Path) -> None:
     ticks = np.arange(crossing.motions[0].asked, crossing.motions[-1].ended, EVERY)
     solid, bump = ((tick - ticks[0]) / RATE for tick in (crossing.solid, _bump(crossing)))
     np.savez_compressed(folder / POSES, q=q[ticks - 2], times=(ticks - ticks[0]) / RATE, solid=solid, bump=bump)
+
+
+def _kept_poses(folder: Path) -> Mapping[str, Array]:
+    """Return the poses that `keep_poses` saved for the first launch of a run that has them."""
+    found = sorted(folder.glob(f"launch-*/{POSES}"))
+    if not found:
+        raise InvalidValue(f"{folder} has no launch-*/{POSES}, from which the filmstrip is drawn: begin a new run without --resume.")
+    kept: Mapping[str, Array] = np.load(found[0])
+    return kept
 
 
 def _bump(crossing: Crossing) -> int:
@@ -198,8 +214,10 @@ def _turned(q: Array, bump: int, vertex: int, ended: int) -> int:
 def findings(crossings: Sequence[Measures]) -> dict[str, Any]:
     """Return the results of the crossings as a dict with the keys "live" and "claims".
 
-    "live": numbers of crossings, of those with a bump, and of those that arrived; and, if there was a bump, medians and maxima of the times
-    [ms] of `Measures`, and how often the arm took the path above the ball at once.  "claims": the judged claims.
+    "live": a dict with the numbers of "crossings", of those "with_a_bump", and of those that "arrived"; and, if there was a bump, the
+    median and the maximum (endings "_ms_median" and "_ms_most") of the times "command", "turn" and "thinking" of `Measures` [ms], and
+    "at_once_around", how often the arm took the path above the ball at once.  "claims": a list with the judged claims, as dicts
+    (`Claim.record`).
     """
     bumped = [one for one in crossings if one.bumped]
     row: dict[str, Any] = {"crossings": len(crossings), "with_a_bump": len(bumped), "arrived": sum(one.arrived for one in crossings)}
@@ -251,10 +269,10 @@ def figure(folder: Path) -> Path:
     """Draw two filmstrips as in thesis figure 4.7, and return their path: the short path through the ball, and the path around it.
 
     `folder`: of the run.  The second strip shows the first recorded crossing.  A second file gets the distributions of the times after the
-    bump.
+    bump.  Raises InvalidValue if no crossing is finished, or if the poses of the first one are missing.
     """
-    plot_times(_crossings(folder)).savefig(folder / "replanning-times.png", dpi=110)
-    kept = np.load(next(path for path in sorted(folder.glob("launch-*")) if (path / POSES).exists()) / POSES)
+    crossings, kept = _crossings(folder), _kept_poses(folder)
+    plot_times(crossings).savefig(folder / "replanning-times.png", dpi=110)
     solid, bump = float(kept["solid"]), float(kept["bump"])
 
     def caption(motion: Motion, moment: int) -> str:

@@ -97,7 +97,8 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 def search(gains: str, forced: bool, tries: int, seed: int) -> Search:
     """Search for large violations: first by random tries, then by variations of the worst commands of each clause.
 
-    `gains`: name of the gain set.  `forced`: whether a client pushes.  `tries`: number of tries to make.  Returns the final state.
+    `gains`: name of the gain set.  `forced`: whether a client pushes.  `tries`: number of tries to make; both arms try at once, so if it is
+    odd, the last run counts for the left arm only.  Returns the final state.
     """
     state, numbers = Search(gains, forced, seed), Gains.named(gains)
     while state.tries < tries:
@@ -109,7 +110,8 @@ def search(gains: str, forced: bool, tries: int, seed: int) -> Search:
         for _ in range(min(GENERATION, tries - state.tries + 1) // len(ARMS)):
             commands = [random_command(rng, forced) if is_random else _next(rng, state) for _ in ARMS]
             torso, noise = rng.uniform(-1.0, 1.0, 3), int(rng.integers(2**31))
-            _record(state, try_commands(numbers, commands, torso, noise), commands, torso.tolist(), noise, is_random)
+            counted = min(len(ARMS), tries - state.tries)
+            _record(state, try_commands(numbers, commands, torso, noise), commands, torso.tolist(), noise, is_random, counted)
         state.course.append((state.tries, state.worst))
     return state
 
@@ -122,9 +124,10 @@ def _next(rng: np.random.Generator, state: Search) -> Command:
     return vary(rng, from_numbers(one), from_numbers(other))
 
 
-def _record(state: Search, tried: Tried, commands: list[Command], torso: list[float], seed: int, is_random: bool) -> None:
+def _record(state: Search, tried: Tried, commands: list[Command], torso: list[float], seed: int, is_random: bool, counted: int) -> None:
+    """Add the tries of one run, which are those of the first `counted` arms, to the state of the search."""
     violations = np.rad2deg(tried.violations)
-    for arm, command in enumerate(commands):
+    for arm, command in enumerate(commands[:counted]):
         state.tries += 1
         numbers = as_numbers(command)
         for clause, value in enumerate(violations[arm].tolist()):
@@ -143,15 +146,15 @@ def _record(state: Search, tried: Tried, commands: list[Command], torso: list[fl
             state.inside[-1] = max(state.inside[-1], worst)
         if is_random:
             state.random[-1] = max(state.random[-1], worst)
-    state.stop = max(state.stop, float(np.rad2deg(tried.stop.max())))
+    state.stop = max(state.stop, float(np.rad2deg(tried.stop[:counted].max())))
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the results as a dict from the gain set to its parts, "attractors" (no forces of a client) and "forced".
+    """Return the results as a dict from the gain set to a dict with "attractors" (no forces of a client) and "forced", and "passed".
 
-    Each part has the largest violations of a search, in degrees along the normal of a constraint, negative inside; of several seeds the
-    worst one.  "passed": whether the largest violation of the default gains without forces is below "allowed_deg" (2 degrees); None if they
-    were not run.
+    Each of the two is a dict with the largest violations of a search, in degrees along the normal of a constraint, negative inside; of
+    several seeds the worst one.  "allowed_deg" is the bound, 2 degrees.  "passed": whether the largest violation of the default gains
+    without forces is below it; None if they were not run.
     """
     table: dict[str, Any] = {}
     for state in sorted(_searches(found), key=lambda state: state.worst):

@@ -186,8 +186,9 @@ COLUMNS: dict[str, Callable[[Run], float]] = {
 def findings(found: Cells) -> dict[str, Any]:
     """Return the results as a dict with two keys, "runs" and "claims".
 
-    "runs" has a row for each combination of control law, prior and discount; the laws are the published one and its variants in `LAWS`.
-    "claims" is the list of the claims with their measured values and verdicts.  If runs of the published law are missing for some prior or
+    "runs" is a dict from each combination of control law, prior and discount to a row: "seeds", "actions" with its interval "low" to
+    "high", and means of the numbers in COLUMNS; the laws are the published one and its variants in `LAWS`.  "claims" is a list with the
+    claims, their measured values and their verdicts, as dicts (`Claim.record`).  If runs of the published law are missing for some prior or
     discount, all claims stay unmeasured and are not judged.
     """
     laws, rows = groups(found), {}
@@ -365,9 +366,10 @@ CLAIMS = (*numbers, sooner, least_visited, fail, enter, spikes, dips, peaks, deg
 def plot(found: Cells) -> Any:
     """Draw tries and values of every state-action under the published law, as in figs. 7.6 and 7.7.
 
-    The figure has a row of panels for each prior and discount, and a colour for each run.  Returns a matplotlib figure.
+    The figure has a row of panels for each prior and discount, and a colour for each run.  Returns a matplotlib figure.  Raises
+    InvalidValue if no run of the published law is finished.
     """
-    grouped = groups(found)[PUBLISHED_LAW]
+    grouped = groups(found).get(PUBLISHED_LAW, {})
     drawing = new_figure(15.0, 2.3 * len(grouped))
     for panels, ((initial, discount), runs) in zip(drawing.subplots(len(grouped), 2, squeeze=False), grouped.items(), strict=True):
         mean = np.mean([run.transitions for run in runs])

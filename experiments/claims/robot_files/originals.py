@@ -87,10 +87,12 @@ def results(folder: Path) -> dict[str, Any]:
     """Write the table of the run in `folder`, and return the counts of its files.
 
     Keys: "files", "robots" and "load", numbers of files; "share", of files that load; "compared" and "agree", numbers of robots that were
-    compared, and whose readings agree; "poses" and "contacts", compared in all; "table", path of the table; "passed", whether at least 95 %
-    of the files load and all compared robots agree.
+    compared, and whose readings agree; "poses" and "contacts", numbers of those that were compared in all; "table", path of the table;
+    "passed", whether at least 95 % of the files load and all compared robots agree.  Raises InvalidValue if no file was read yet.
     """
     rows = read_records(folder / RECORDS, COLUMNS)
+    if not rows:
+        raise InvalidValue(f"{folder} has no record of a file: continue the run with --resume.")
     write_table(rows, folder / TABLE)
     loaded = [row for row in rows if row["loads"] == "yes"]
     compared = [row for row in loaded if row["agrees"]]

@@ -97,9 +97,10 @@ def failures(one: Measured) -> list[str]:
 def results(folder: Path) -> dict[str, Any]:
     """Return the worst value of each measurement over all robots of the run in `folder`, the robots that fail, and "passed".
 
-    "failed": dict from the name of a robot to the parts of the claim that it does not meet, as in `failures`.  "refused": dict from the
-    name of a robot that could not be read to the reason.  "touch themselves at home" and "and with the SRDF": numbers of robots.  The worst
-    values are None without robots.  "passed": whether no robot failed or was refused, None without robots.
+    "robots": number of robots that could be read.  "failed": dict from the name of a robot to a list of short texts about the parts of the
+    claim that it does not meet, as in `failures`.  "refused": dict from the name of a robot that could not be read to the reason.  "touch
+    themselves at home" and "and with the SRDF" (a file that lists pairs not to be tested): numbers of robots.  "worst_..." and
+    "longest_...": the worst values, None without robots.  "passed": whether no robot failed or was refused, None without robots.
     """
     found, refused = read(folder), read_records(folder / REFUSED, ("robot", "why"))
     failed = {one.robot: failures(one) for one in found if failures(one)}
@@ -129,7 +130,8 @@ def figure(folder: Path) -> Path:
 def table(found: Sequence[Measured]) -> list[str]:
     """Return the measurements as the lines of a Markdown table, one robot per line."""
     heads = "robot | motors (slides) | solids | contacts at home | pairs written (s) | contacts then | drift [deg] | drift [mm] | "
-    heads += "slides within [mm] | 250 actions [s] | touching after them | fields: drift [deg] | 250 actions [s] | touching after them"
+    heads += "slides within [mm] | 250 actions [s] | touching after them | fields: drift [deg] | "
+    heads += "fields: 250 actions [s] | fields: touching after them"
     lines = [f"| {heads} |", "|---" * 14 + "|"]
     for one in found:
         motors = f"{one.motors} ({one.slides})" if one.slides else f"{one.motors}"
@@ -176,7 +178,10 @@ class Measured(Row):
 
 
 def measure(name: str, urdf: Path, folder: Path, seed: int) -> Measured:
-    """Measure one robot.  `urdf`: its file.  `folder`: for the SRDF that is written."""
+    """Measure one robot: contacts at home, drift, prismatic joints, and time to learn; raises MobeeError if it cannot be read.
+
+    `name`: name of the robot.  `urdf`: its file.  `folder`: folder for the SRDF that is written.  `seed`: of all random choices.
+    """
     robot = load_robot(urdf)
     before = Model(robot).evaluate(robot.home)
     start = time.perf_counter()

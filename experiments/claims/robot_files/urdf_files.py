@@ -72,16 +72,16 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 def read_all(path: Path) -> list[FileRecord]:
-    """Read the records of a run from its CSV file; returns an empty list if there is no file."""
+    """Read the records of a run from its CSV file, one for each URDF file; returns an empty list if there is no CSV file."""
     return [FileRecord.of_record(row) for row in read_records(path, FileRecord.columns())]
 
 
 def results(found: Sequence[FileRecord]) -> dict[str, Any]:
     """Return the results of all files.
 
-    Keys: "sets", dict from the name of a set of files, or "all", to its `numbers`; "refused", "contacts_that_differ" and "not_compared",
-    dicts from the name of a file to a text that says why or how much; "passed", whether no file crashes, frames differ by at most 1e-9, and
-    no contact differs.
+    Keys: "sets", dict from the name of a set of files, or "all", to the dict that `numbers` returns for it; "refused",
+    "contacts_that_differ" and "not_compared", dicts from the name of a file to a text that says why or how much; "passed", whether no file
+    crashes, frames differ by at most 1e-9, and no contact differs.
     """
     sets = {set_name: [one for one in found if one.name.startswith(f"{set_name}/")] for set_name in dict.fromkeys(map(_set_of, found))}
     table = {set_name: numbers(some) for set_name, some in {**sets, "all": list(found)}.items()}

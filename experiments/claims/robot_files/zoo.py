@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """The zoo: whether robots by other authors become curious without an edit, and how deep they touch themselves while they explore.
 
-Claim: every robot of five collections loads as it is, gets arms, joints, home, pairs and fields from `mobee.derive`, touches nothing at
+Claim: every robot of six collections loads as it is, gets arms, joints, home, pairs and fields from `mobee.derive`, touches nothing at
 home, touches itself no deeper than 2 mm in ten minutes of curiosity with the derived gains, and its agent tries every action of the states
 that it comes to; or one line says what it cannot do.  Source: aims of this reproduction; the thesis has one robot.  Published number: none.
 Run time: 15 seconds for each robot.
 
-The collections are icub_models, pybullet_data, example-robot-data (URDF), robosuite and dm_control (MJCF), as far as they are installed, or
---folders.  All derived arms of a robot learn at once on one offline plant for --minutes of robot time; the true positions of its motors are
-compared with its solids every 0.1 s.  Then the agent of the arm that moves its end farthest learns alone for --actions transitions.  The
-results of each robot are written before the next robot is measured, and --resume continues after them.  The figure is a table in Markdown.
+The collections are icub_models, pybullet_data, example-robot-data (URDF), robosuite, dm_control and kinova (MJCF); kinova are the robots of
+other makers in the package dm_control.  --folders names the collections; without it, the packages that are installed are searched, and
+kinova is left out.  All derived arms of a robot learn at once on one offline plant for --minutes of robot time; the true positions of its
+motors are compared with its solids every 0.1 s.  Then the agent of the arm that moves its end farthest learns alone for --actions
+transitions.  The results of each robot are written before the next robot is measured, and --resume continues after them.  The figure is a
+table in Markdown.
 """
 
 from __future__ import annotations
@@ -120,7 +122,7 @@ def _ascii(text: str) -> str:
 def measure(name: str, file: Path, minutes: float, actions: int, seed: int) -> Measured:
     """Measure one robot from its file; raises MobeeError if it cannot be read, or if no part of it can learn.
 
-    `minutes`: robot time in which all arms learn.  `actions`: transitions of the single agent.
+    `minutes`: robot time in which all arms learn.  `actions`: transitions of the agent that learns alone.  `seed`: of all random choices.
     """
     start = time.perf_counter()
     robot = load_robot(file)
@@ -190,7 +192,7 @@ def read(folder: Path) -> list[Measured]:
 
 
 def read_refused(folder: Path) -> list[dict[str, str]]:
-    """Read which files of a run were refused, as dicts with the keys "robot" and "why"."""
+    """Read which files of a run were refused: a list with a dict for each file, with the keys "robot" (its name) and "why" (the reason)."""
     return read_records(folder / REFUSED, ("robot", "why"))
 
 
@@ -208,10 +210,11 @@ def failures(one: Measured) -> list[str]:
 def results(folder: Path) -> dict[str, Any]:
     """Return the results of the run in `folder`.
 
-    Main keys: "robots": number of robots that were measured; "meet the claim": number of robots without a failure; "cannot": dict from the
-    name of a robot that does not meet the claim to a text that says what it cannot do; "refused": dict from the name of a file that could
-    not be used to the reason; "no robots": number of files that hold nothing that can learn; "passed": whether all robots meet the claim,
-    None if no robot was measured.
+    Main keys: "robots": number of robots that were measured; "within 2 mm" and "tried all that can be tried": numbers of those whose
+    contacts stay so shallow, and whose single agent tried all its actions; "meet the claim": number of robots without a failure; "cannot":
+    dict from the name of a robot that does not meet the claim to a text that says what it cannot do; "refused": dict from the name of a
+    file that could not be used to the reason; "no robots": number of files that hold nothing that can learn; "passed": whether all robots
+    meet the claim, None if no robot was measured.
     """
     found, refused = read(folder), read_refused(folder)
     failed = {one.robot: "; ".join(failures(one)) for one in found if failures(one)}
@@ -250,7 +253,7 @@ def table(found: Sequence[Measured]) -> list[str]:
 
 
 EXPERIMENT = Experiment(
-    claim="robots of five collections become curious without an edit, and stay out of themselves within 2 mm",
+    claim="robots of six collections become curious without an edit, and stay out of themselves within 2 mm",
     source="aims of this reproduction",
     method=Steps(add_arguments, run, figure),
 )

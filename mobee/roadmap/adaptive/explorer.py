@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from mobee.arrays import Array
+from mobee.arrays import Array, Ints
 from mobee.errors import MobeeError
 from mobee.learning.explorers import Draws
 from mobee.plant import Plant
@@ -109,6 +109,12 @@ class MapExplorer(Walker):
         self.record.change("join", state=here, samples=between.tolist(), goal=goal)
         self.repairs += 1
         return True
+
+    def _renumber(self, number: Ints) -> None:
+        super()._renumber(number)
+        self._asked_for = Counter({int(number[vertex]): count for vertex, count in self._asked_for.items() if number[vertex] >= 0})
+        if self._target is not None:
+            self._target = int(number[self._target]) if number[self._target] >= 0 else None
 
     def _door(self, near: list[int]) -> int:
         try:

@@ -4,10 +4,12 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from mobee.arrays import Ints
 from mobee.database import damaged, explained, json_of, transaction
 from mobee.errors import UnknownName
 from mobee.plant import Outcome
@@ -96,6 +98,8 @@ class MapRecord:
         """Number of observed tries of edges, those read from the store included."""
         self.joined: set[int] = set()
         """Numbers of the vertices that were added by `join`."""
+        self.on_renumbered: Callable[[Ints], None] = lambda number: None
+        """Called after a change has given the vertices other numbers, with the result of `prune`: new numbers (S,), -1 for removed ones."""
         if store is not None:
             store.bind(settings)
             self._replay(store)
@@ -130,7 +134,10 @@ class MapRecord:
             raise UnknownName("change of a map", what, CHANGES)
         if self._store is not None:
             self._store.changed(what, **given)
-        return self._apply(what, given)
+        result = self._apply(what, given)
+        if what == "prune":
+            self.on_renumbered(result)
+        return result
 
     def _apply(self, what: str, given: dict[str, Any]) -> Any:
         result = getattr(self.roadmap, what)(**given)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mobee.arrays import Array
+from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue, MobeeError
 from mobee.learning.goal import target_states
 from mobee.plant import Outcome, Plant
@@ -66,7 +66,8 @@ class Walker:
         """The vertex where the part is; None if the part is at no vertex, or if its position is not known."""
         self._trail: list[int] = []  # the vertices visited, the last one at the end
         self.record = MapRecord(roadmap, store, self.settings)
-        """The record of observations and changes; change the map only by `record.change`, and set `here` to None after "prune"."""
+        """The record of observations and changes; change the map only by `record.change`."""
+        self.record.on_renumbered = self._renumber
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -142,6 +143,12 @@ class Walker:
                 self.here = vertex
                 break
         return self.enter()
+
+    def _renumber(self, number: Ints) -> None:
+        """Replace the kept numbers of vertices by their new ones, and forget removed vertices; `number` (S,): new numbers, -1: removed."""
+        if self.here is not None:
+            self.here = int(number[self.here]) if number[self.here] >= 0 else None
+        self._trail = [int(number[vertex]) for vertex in self._trail if number[vertex] >= 0]
 
     def _move(self, vertex: int) -> Outcome:
         self.here = None  # until the action has ended

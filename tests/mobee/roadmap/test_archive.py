@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+import json
 import tracemalloc
 import zipfile
 from collections.abc import Callable
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 
 import mobee
-from mobee.roadmap.archive import read, robot_digest, world_digest
+from mobee.roadmap.archive import read, robot_digest, world_as_json, world_digest, world_from_json
 
 
 def test_a_robot_read_again_under_another_name_is_the_same(icub: mobee.Robot) -> None:
@@ -53,6 +54,27 @@ def test_attaching_an_object_changes_the_world_s_digest() -> None:
         world.add("cup", mobee.sphere(0.03))
     carried.attach("cup", "l_hand", (np.zeros(3), np.eye(3)))
     assert world_digest(free) != world_digest(carried)
+
+
+def test_mass_and_friction_of_objects_are_kept_and_may_be_absent() -> None:
+    world = mobee.World()
+    world.add("cup", mobee.cylinder(0.03, 0.1), position=(0.1, 0.2, 0.3), role="target", color=(1.0, 0.0, 0.0), mass=0.2, friction=0.8)
+    world.add("ball", mobee.sphere(0.05), mass=0.1)
+    world.add("ice", mobee.box(0.1, 0.1, 0.1), friction=0.0)
+    world.add("table", mobee.box(1.0, 1.0, 0.1))
+    world.attach("ball", "l_hand", (np.full(3, 0.1), np.eye(3)))
+    stored = json.loads(json.dumps(world_as_json(world)))
+    assert [sorted({"mass", "friction"} & one.keys()) for one in stored] == [["friction", "mass"], ["mass"], ["friction"], []]
+    again = world_from_json(stored)
+    for name, one in world.objects.items():
+        other = again.objects[name]
+        assert (other.mass, other.friction, other.color, other.link) == (one.mass, one.friction, one.color, one.link)
+        assert (other.kind, other.size, other.role) == (one.kind, one.size, one.role)
+        assert np.array_equal(other.position, one.position) and np.array_equal(other.rotation, one.rotation)
+    earlier = world_from_json([{key: one[key] for key in one if key not in ("mass", "friction")} for one in stored])
+    assert {(one.mass, one.friction) for one in earlier.objects.values()} == {(None, 0.5)}
+    with pytest.raises(mobee.InvalidValue, match="mass 'heavy'"):
+        world_from_json([stored[0] | {"mass": "heavy"}])
 
 
 def _bomb(path: Path, header: bytes, content: bytes, notes: bytes = b"{}", compress: int = zipfile.ZIP_STORED) -> None:

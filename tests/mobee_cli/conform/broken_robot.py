@@ -92,6 +92,11 @@ def turned(own: Any) -> Any:
     return patch.object(own.motors, "command", lambda part, mode, ref: command(part, mode, -ref if mode == "velocity" else ref))
 
 
+def half_mindless(own: Any) -> Any:
+    """Only the first part holds."""
+    return patch.object(Guard, "hold_all", lambda guard, why: next(iter(guard.gates.values())).force_hold(why))
+
+
 def nothing(place: Any, name: str) -> Callable[[Any], Any]:
     return lambda own: patch.object(place, name, lambda *given: None)
 
@@ -104,6 +109,7 @@ FAULTS: dict[str, Callable[[Any], Any]] = {
     "short": lambda own: published(own, lambda fields: {**fields, "q": fields["q"][1:]}),
     "part": lambda own: published(own, lambda fields: without(fields, "torso")),
     "order": lambda own: meta(own, lambda made: msgspec.structs.replace(made, motors=made.motors[::-1])),
+    "limits": lambda own: meta(own, lambda made: msgspec.structs.replace(made, upper=[2.0 * upper for upper in made.upper])),
     "deaf": lambda own: patch.object(own.motors, "command", lambda *given: None),
     "turned": turned,
     "eager": eager,
@@ -117,6 +123,7 @@ FAULTS: dict[str, Callable[[Any], Any]] = {
     "same_epoch": same_epoch,
     "orphan": nothing(Gate, "lose_owner"),
     "mindless": nothing(Guard, "hold_all"),
+    "half_mindless": half_mindless,
     "unstoppable": nothing(Guard, "_stop_all"),
     "silent_stop": nothing(Guard, "_repeat_stop"),
 }

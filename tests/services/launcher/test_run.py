@@ -9,14 +9,18 @@ import socket
 import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import psutil
 import pytest
 
 from bus_schema.messages import EStop
+from services.common.exit_codes import ENVIRONMENT
 from services.common.observe import Received, listen
 from services.common.session import open_client
+from services.launcher import run
 from services.launcher.catalogue import entry_of
+from services.launcher.connection import Connection, open_bus
 from tests.services.launcher.launched import Launched, is_free, mobee, toys, wait_until
 
 Launch = Callable[..., Launched]
@@ -65,6 +69,21 @@ def test_the_run_folder_says_what_was_run(launch: Launch, endpoint: str) -> None
     assert "python" in tomllib.loads((folder / "versions.toml").read_text())
     assert folder.stat().st_mode & 0o077 == 0
     assert "ready as" in (folder / "logs" / "one.log").read_text()
+
+
+def test_a_launch_that_cannot_write_leaves_no_session_open(tmp_path: Path, endpoint: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[Connection] = []
+
+    def open_noted(*given: Any) -> Connection:
+        opened.append(open_bus(*given))
+        return opened[-1]
+
+    monkeypatch.setattr(run, "open_bus", open_noted)
+    (tmp_path / "file").touch()
+    (tmp_path / "toys.toml").write_text(toys(one="healthy"))
+    options = run.Options(str(tmp_path / "toys.toml"), endpoint=endpoint, runs=tmp_path / "file" / "runs")
+    assert run.launch(options) == ENVIRONMENT
+    assert [bus.session.is_closed() for bus in opened] == [True]
 
 
 def test_services_start_after_those_they_need_and_end_before_them(launch: Launch) -> None:

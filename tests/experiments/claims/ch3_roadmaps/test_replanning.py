@@ -13,6 +13,7 @@ from experiments.claims.ch3_roadmaps.replanning import CLAIMS, findings, keep_po
 from experiments.claims.ch3_roadmaps.replanning_live import ABOVE, LEFT, PART, RIGHT, Acted, Crossing, Job, ball, model, new_map, robot
 from experiments.kit.live.launch import append_done, read_job, write_job
 from experiments.kit.live.recordings import CONTACTS, POSITIONS
+from mobee.errors import InvalidValue
 
 ARM = robot().parts[PART].slice
 BUMP, TURN, END = 40, 52, 120
@@ -83,3 +84,6 @@ def test_the_pictures_are_drawn(folder: Path, monkeypatch: pytest.MonkeyPatch) -
     run = folder.parent
     assert replanning.EXPERIMENT.method.figure(run).name == "replanning.png"
     assert (run / "replanning-times.png").exists()
+    (run / "launch-000" / replanning.POSES).unlink()
+    with pytest.raises(InvalidValue, match=r"has no launch-\*/poses.npz, .*: begin a new run without --resume"):
+        replanning.EXPERIMENT.method.figure(run)

@@ -32,6 +32,22 @@ def test_the_search_gets_nearer_to_the_worst_command_than_chance(imagined) -> No
     assert state.by_clause[1] == state.worst and state.worst_try["clause"] == 1
 
 
+@pytest.mark.parametrize("tries", [1, 2, 101, 333])
+def test_the_search_makes_as_many_tries_as_are_asked_for(imagined, tries: int) -> None:
+    state = constraint_violations.search("default", False, tries, seed=1)
+    assert state.tries == state.course[-1][0] == tries
+
+
+def test_the_uncounted_arm_of_an_odd_number_of_tries_is_not_judged(monkeypatch) -> None:
+    def tried(gains, commands, torso, seed):
+        return Tried(PlantRun(np.zeros((1, 1)), np.zeros((1, 1)), 0.01), np.array([[-0.5] * 7, [0.5] * 7]), np.array([0.1, 2.0]))
+
+    monkeypatch.setattr(constraint_violations, "try_commands", tried)
+    state = constraint_violations.search("default", False, 1, seed=1)
+    assert state.worst < 0.0 and max(state.by_clause) < 0.0 and state.stop == pytest.approx(np.rad2deg(0.1))
+    assert len(state.worst_try["commands"]) == 2 and state.worst_try["arm"] == 0
+
+
 def test_a_try_is_judged_by_where_the_arms_have_been() -> None:
     robot = load_robot("icub")
     rng = np.random.default_rng(2)

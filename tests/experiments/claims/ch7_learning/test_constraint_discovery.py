@@ -4,6 +4,7 @@ from __future__ import annotations
 from itertools import product
 
 import numpy as np
+import pytest
 
 from experiments.claims.ch7_learning.constraint_discovery import (
     DISCOUNTS,
@@ -15,11 +16,13 @@ from experiments.claims.ch7_learning.constraint_discovery import (
     findings,
     numbers,
     peaks,
+    plot,
     sooner,
     stochastic,
     summary,
 )
 from experiments.kit.learning.arm import arm_space
+from mobee.errors import InvalidValue
 from tests.experiments.finished_cells import Cell, finished
 
 SPACE = arm_space()
@@ -61,3 +64,9 @@ def test_claims_stay_open_while_settings_were_not_run():
     )
     assert {claim["verdict"] for claim in results["claims"]} == {"open"}
     assert results["runs"]["as published, 50-50, discount 0.9"]["failing_actions_fail"] == 1.0
+
+
+def test_without_a_finished_run_of_the_published_law_there_is_no_figure():
+    other = [Cell("a", 0, {"law": [*LAWS][1], "initial": "50-50", "discount": 0.9, "least": 5})]
+    with pytest.raises(InvalidValue, match="finished: continue the run with --resume"):
+        plot(finished(lambda cell: explored(0), other))

@@ -11,6 +11,8 @@ import pytest
 
 from experiments.claims.robot_files.original_comparison import compare
 from experiments.claims.robot_files.original_files import find_originals
+from experiments.claims.robot_files.originals import COLUMNS, RECORDS, results
+from mobee.errors import InvalidValue
 from mobee.robot.load import load_robot
 from mobee.robot.xml.write import write_upgraded
 from tests.experiments.claims.robot_files.random_original import random_original
@@ -40,6 +42,13 @@ def test_a_difference_is_found(tmp_path: Path) -> None:
         robot = load_robot(path)
     path.write_text(random_original(3).replace('<link z="0.1" ', '<link z="0.101" length="0.1" x="0.01" '), encoding="utf-8")
     assert not compare(path, robot, poses=3, seed=0).agrees
+
+
+def test_a_run_without_a_record_has_no_results(tmp_path: Path) -> None:
+    for _ in range(2):
+        with pytest.raises(InvalidValue, match="has no record of a file: continue the run with --resume"):
+            results(tmp_path)
+        (tmp_path / RECORDS).write_text(",".join(COLUMNS) + "\n")
 
 
 def test_every_version_of_a_history_is_found_once(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.claims.robot_files.own_robots import failures, read, results, run
+from experiments.claims.robot_files.own_robots import failures, figure, read, results, run
 from experiments.claims.robot_files.sample_robots import GENERATED, robot_file
 from mobee import load_robot
 
@@ -48,6 +48,12 @@ def test_failed_parts_of_the_claim_are_named(done: Path) -> None:
     assert failures(good) == []
     bad = replace(good, drift_mm=1.5, touching_after=1, unsettled=1, field_actions_s=16.0)
     assert failures(bad) == ["drifts", "touches itself at home", "slide off", "slow"]
+
+
+def test_the_columns_of_the_table_have_different_heads(done: Path) -> None:
+    cells = [line.strip("| ").split(" | ") for line in figure(done).read_text().splitlines() if not line.startswith("|---")]
+    assert len(set(cells[0])) == len(cells[0]) == 14
+    assert [row[0] for row in cells[1:]] == ["arm of 700 m", "panda_bullet"]
 
 
 def test_a_robot_that_cannot_be_read_is_refused_and_not_tried_again(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import mobee
 from mobee.roadmap.adaptive.explorer import MapExplorer
 from mobee.roadmap.adaptive.record import MapStore
 from mobee.roadmap.adaptive.walker import Walker
-from tests.mobee.roadmap.toy_map import SQUARE, BlockedPlant, random_map, square, wall
+from tests.mobee.roadmap.toy_map import JOINTS, ROBOT, SQUARE, BlockedPlant, random_map, square, wall
 
 A, B, C, D = SQUARE
 
@@ -141,3 +141,52 @@ def test_pushed_off_the_map_it_retraces_its_path_until_it_reaches_a_vertex():
     plant.acted.clear()
     assert walker.enter() == 1
     assert np.array_equal(plant.acted, [C, B])
+
+
+def without_corner_a(plant):
+    """A walker that has gone from A over B to C, and then finds that no edge leads to A, which the map loses."""
+    walker = Walker(square(), plant, near=0.05)
+    walker.go(1)
+    walker.go(2)
+    for state in (1, 3):
+        walker.roadmap.observe(state, walker.roadmap.action(state, 0), state)
+    assert walker.record.change("prune", start=2).tolist() == [-1, 0, 1, 2]
+    plant.acted.clear()
+    return walker
+
+
+def test_after_pruning_it_knows_where_it_is():
+    plant = BlockedPlant(A, lambda q, target: False)
+    walker = without_corner_a(plant)
+    assert walker.here == 1 and walker.go(0).edges == 1
+    assert np.array_equal(plant.acted, [B])
+
+
+def test_after_pruning_it_retraces_the_part_of_its_path_that_is_left():
+    plant = BlockedPlant(A, lambda q, target: False)
+    walker = without_corner_a(plant)
+    walker.here, plant.q = None, np.array([0.5, 0.9, 0.0])
+    assert walker.enter() == 0
+    assert np.array_equal(plant.acted, [B])
+
+
+def test_where_pruning_has_removed_its_vertex_it_goes_to_another_one():
+    plant = BlockedPlant(A, lambda q, target: False)
+    walker = Walker(square(), plant)
+    walker.enter()
+    for state in (1, 3):
+        walker.roadmap.observe(state, walker.roadmap.action(state, 0), state)
+    walker.record.change("prune", start=2)
+    assert walker.here is None and walker.enter() == 0
+    assert np.array_equal(plant.acted, [B])
+
+
+def test_an_explorer_still_knows_its_target_after_pruning():
+    samples = [[0.5 * k, 0.0, 0.0] for k in range(5)]
+    roadmap = mobee.AdaptiveRoadmap(mobee.Space(ROBOT, JOINTS, samples, [[1, -1], [2, -1], [1, 3], [2, 4], [3, -1]]))
+    for state, action in roadmap.unexplored[:-1].tolist():
+        roadmap.observe(state, action, roadmap.space.goal(state, action))
+    explorer = MapExplorer(roadmap, BlockedPlant(samples[1], lambda q, target: False))
+    assert not explorer.explore(1) and explorer.here == 2  # on the way to vertex 4
+    explorer.record.change("prune", start=2)
+    assert len(roadmap) == 4 and explorer.explore() and len(roadmap.unexplored) == 0
