@@ -111,7 +111,7 @@ class StepDone(Message, frozen=True, kw_only=True):
 
 
 class Turn(Message, frozen=True, kw_only=True):
-    """Message to one participant in lockstep (the name in the key): tick k waits for its answer.
+    """Message to one participant in lockstep (the name in the key): tick k waits for the answer of this participant.
 
     The tick waits because the participant may have an action to decide.
     """
@@ -519,7 +519,10 @@ class EStop(Message, frozen=True, kw_only=True):
 
 
 class Served(Message, frozen=True, kw_only=True):
-    """A call that the sender has answered, except `stat` and `config`, with the request and the reply as they were sent."""
+    """A call that the sender has answered, with the request and the reply as they were sent.
+
+    The calls `stat` and `config` are not published: they are repeated often, and change nothing.
+    """
 
     stream: ClassVar[Stream] = Stream(
         "served/{service}", "CONTROL", writers=EVERYONE, readers=(), when="after each call, if there is a subscriber"

@@ -72,7 +72,7 @@ def robot_given(arguments: argparse.Namespace, default: str = DEFAULT) -> Robot:
 def world_given(arguments: argparse.Namespace, default: str = DEFAULT) -> World:
     """Load the world that the arguments name; without a name, the usual world of the robot.
 
-    `default`: robot if the arguments name none. Raises MobeeError.
+    `default`: robot if the arguments name none. Raises MobeeError if the world or the robot cannot be read.
     """
     return world_around(arguments.world, arguments.robot or default)
 
@@ -101,9 +101,9 @@ def robot_of_run(run: Path) -> str | None:
 
 
 def given_options(arguments: argparse.Namespace, names: Sequence[str] = ("robot", "world")) -> list[str]:
-    """Return the options for robot, world and URDF files that the user has given, as on the command line, such as "--robot icub".
+    """Return the options for robot, world and URDF files that the user has given, each as one string, such as "--robot icub".
 
-    `names`: which of robot and world to include.
+    `names`: which of the options --robot and --world to include, if they are given.
     """
     options = {name: getattr(arguments, name, None) for name in names} | urdf_options(arguments)
     return [f"--{name} {value}" for name, value in options.items() if value is not None]
@@ -112,7 +112,8 @@ def given_options(arguments: argparse.Namespace, names: Sequence[str] = ("robot"
 def require_none(arguments: argparse.Namespace, why: str, names: Sequence[str] = ("robot", "world")) -> None:
     """Raise UserError for the first option for robot, world or URDF files that the user has given, because the verb cannot use it.
 
-    `why`: text of the error. `names`: which of robot and world to include.
+    `why`: why the verb cannot use it; this text follows the option in the error. `names`: which of the options --robot and --world to
+    refuse; options for URDF files are always refused.
     """
     for option in given_options(arguments, names):
         raise UserError(f"{option}: {why}", BAD_INPUT)

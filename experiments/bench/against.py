@@ -163,10 +163,11 @@ def _git(*words: str) -> None:
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """Run this benchmark and return its result; raises AgainstFailed.
+    """Run this benchmark and return its result; raises AgainstFailed if a checkout cannot be measured.
 
-    If a checkout is given as a commit, its native core is built first.  Main keys: "cases", for each case the times of both checkouts and
-    their ratio, as `compared` returns them; "requirements", the list of judged requirements, each a dict; "passed", whether all are met.
+    If a checkout is given as a commit, its native core is built first.  Main keys: "cases", a dict from the name of each case to the dict
+    of `compared`, with the times of both checkouts and their ratio; "requirements", a list with the dict that `Requirement.judge` returns
+    for each requirement; "passed", whether all are met.
     """
     with checkout(settings.old, settings.old_python) as old, checkout(settings.new) as new:
         for given, one in ((settings.old, old), (settings.new, new)):
@@ -179,8 +180,8 @@ def measure_checkouts(old: Checkout, new: Checkout, cases: Sequence[str], rounds
     """Measure the cases in two checkouts by turns and return the result; raises AgainstFailed.
 
     `cases`: names in `against_cases.CASES`.  Keys: "rounds", their number; "cases", for each case the times of both checkouts and their
-    ratio, as `compared` returns them; "requirements", the list of judged requirements, each a dict, for each case that the new checkout is
-    not slower than the old one; "passed", whether all are met.
+    ratio, as `compared` returns them; "requirements", a list with the dict that `Requirement.judge` returns for each requirement, for each
+    case that the new checkout is not slower than the old one; "passed", whether all are met.
     """
     pairs: dict[str, list[Pair]] = {case: [] for case in cases}
     with Progress() as progress:

@@ -33,7 +33,11 @@ LOCKSTEP_TICKS = (100, 3100)  # of two runs: their difference is without the sta
 
 
 def main() -> None:
-    """Prepare the case that the command line names, then do its work once for every line of standard input and print times and counts."""
+    """Prepare the case that the command line names, then do its work once for every line of standard input.
+
+    Prints lines of JSON: first a dict with the path of the "library", then for each line a dict with "seconds", the time, and "work", the
+    counts of the work.
+    """
     import mobee
 
     name = sys.argv[1]

@@ -111,7 +111,9 @@ def compare(live: Observed, plant: Observed) -> Agreement:
 def measure(settings: Settings) -> dict[str, Any]:
     """Run the agents live and offline, and return the comparison; raises LaunchFailed if the live system does not run.
 
-    Keys: the fields of `Agreement`, "passed", and "lockstep", the part of the live run's summary about lockstep.
+    Keys: the fields of `Agreement`, such as "actions" (number of compared actions) and "worst" (largest difference of a motor's position at
+    the end of an action [rad]); "passed", whether both runs made the same motions, up to 1e-9 rad; "lockstep", the part of the live run's
+    summary about lockstep.
     """
     with tempfile.TemporaryDirectory() as folder:
         live, summary = lockstep(round(settings.actions * ACTION_SECONDS / TICK), settings.seed, Path(folder))

@@ -60,7 +60,8 @@ def measure(settings: Settings) -> dict[str, Any]:
     Main keys: "vertices" and "edges", numbers of the roadmap; processor times [s] of the methods, medians of the rounds: "plain_s" (pose by
     pose), "both_s" and "once_s" (each edge in both directions, or once), "change_s" and "all_s" (after an object was added, only the edges
     near it, or all); "plain_poses", "both_poses" and "once_poses", numbers of checked poses; "agree", whether all methods find the same
-    free edges; "requirements", the list of judged requirements, each a dict; "passed", whether all are met and the methods agree.
+    free edges; "requirements", a list with the dict that `Requirement.judge` returns for each requirement; "passed", whether all are met
+    and the methods agree.
     """
     with one_core() as core, Progress() as progress:
         progress.show(0.0, "making the map")

@@ -145,13 +145,16 @@ def _alone(schedule: Sequence[Fault], times: Sequence[float]) -> Iterator[tuple[
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """Perform the schedules on one system and return the result; raises LaunchFailed.
+    """Perform the schedules on one system and return the result; raises LaunchFailed if the system does not start or ends early.
 
-    Main keys: "hold_ms", by kind of fault the times from a fault until a part holds its position [ms], and "back_s", the times from the end
-    of a schedule's last fault until all parts follow commands again [s], both as "count", percentiles "p50" and "p95", and "max";
-    "transitions", numbers of kept, lost and differing ones on disk; "broken", list of the broken guarantees as text; "rows", the
-    measurements of each schedule; "passed", whether no guarantee is broken, no transition is lost, and the times are short enough.  If the
-    machine was busy, times do not count.
+    A schedule is a sequence of faults, such as a process that is killed.
+
+    Main keys: "hold_ms", a dict from the kind of fault to statistics of the times from a fault until a part stands still in hold [ms];
+    "back_s", the statistics of the times from the end of a schedule's last fault until all parts follow commands again [s]; statistics are
+    dicts with the keys "count", "p50" and "p95" (percentiles), and "max"; "transitions", dict with the numbers of "kept", "lost" and
+    "differing" ones on disk, and of "gaps" (numbers that occur twice on disk); "broken", list of the broken guarantees as text; "rows", a
+    list with the dict of the measurements of each schedule; "passed", whether no guarantee is broken, no transition is lost, and the times
+    are short enough.  If the machine was busy, times do not count.
     """
     rows: list[dict[str, Any]] = []
     with Progress() as progress, tempfile.TemporaryDirectory() as scratch, running(Path(scratch), settings.scenario) as system:

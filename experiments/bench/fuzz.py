@@ -53,12 +53,12 @@ QUICK = Settings(messages=40_000)
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """Send all messages and return the result; raises LaunchFailed.
+    """Send all messages, which are nearly valid, and return the result; raises LaunchFailed if the system fails.
 
-    Main keys: "sent", numbers of sent "messages", "calls" and "tokens"; "refused", number of refused messages by process; "grown_mb" and
-    "largest_growth_mb", growth of memory at the end and at most [MB], by process; "ended", list of the processes that ended; "learned",
-    list of the agents that made a transition afterwards; "passed", whether no process ended, no memory grew too much, and all agents
-    learned.
+    Main keys: "sent", dict of the numbers of sent "messages", "calls" and "tokens"; "refused", dict from a process to the number of
+    messages that it refused; "grown_mb" and "largest_growth_mb", dicts from a process to the growth of its memory at the end and at most
+    [MB]; "ended", list of the processes that ended; "learned", list of the agents that made a transition afterwards; "passed", whether no
+    process ended, no memory grew too much, and all agents learned.
     """
     sent: Counter[str] = Counter()
     begun = time.monotonic()

@@ -93,8 +93,9 @@ def measure(settings: Settings) -> dict[str, Any]:
     """Run this benchmark and return its result; raises NotInstalled without Gymnasium, MuJoCo or imageio.
 
     Main keys: "steps_per_second", and "standard" for the same rates on the standard machine (the one for which the requirements were set),
-    both medians by environment; "times_humanoid" and "times_reacher", rate of the batch of Reach-v0 over that of the peer; "requirements",
-    the list of judged requirements, each a dict; "passed", whether all are met.
+    both dicts from the name of an environment to the median of the rounds; "times_humanoid" and "times_reacher", rate of the batch of
+    Reach-v0 over that of the peer; "requirements", a list with the dict that `Requirement.judge` returns for each requirement; "passed",
+    whether all are met.
     """
     playing, speeds = players(settings.steps), Calibration()
     found: dict[str, list[float]] = {name: [] for name in playing}

@@ -70,8 +70,9 @@ QUICK = Settings(targets=20, whole=5, rivals=5)
 def measure(settings: Settings) -> dict[str, Any]:
     """Run this benchmark and return its result; raises NotInstalled without cma, mink or MuJoCo.
 
-    Main keys: "rows", by solver its statistics as `Tries.row` returns them, with "times_cma", the time of CMA-ES over that of the solver;
-    "requirements", the list of judged requirements, each a dict; "passed", whether all are met.
+    Main keys: "rows", a dict from the name of a solver to its statistics, as `Tries.row` returns them, with "times_cma", the time of CMA-ES
+    over that of the solver; "requirements", a list with the dict that `Requirement.judge` returns for each requirement; "passed", whether
+    all are met.
     """
     load_cma()
     load_mink()

@@ -20,10 +20,11 @@ from experiments.kit.live.launch import summary_of
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A robot and a rate that are measured in one run.
+    """A back-end of the simulated robot and a tick rate, which are measured in one run.
 
-    `least`: required speed, and `aim`: desired speed, in multiples of real time on the standard machine, the one for which the requirements
-    were set; None: no bound.
+    `backend`: "kinematic", "pybullet" or "mujoco".  `rate`: ticks of the control loop per second [Hz].  `least`: the speed that is
+    required; `aim`: the speed that is desired.  Both are in multiples of real time, on the standard machine (the machine for which the
+    requirements were set); None: no bound.
     """
 
     backend: str
@@ -45,18 +46,18 @@ CASES = (
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Settings of the benchmark.  `seconds`: duration of each run [s].  `cases`: the robots and rates to run."""
+    """Settings of the benchmark.  `seconds`: duration of each run [s].  `cases`: the back-ends and tick rates to run."""
 
     seconds: float = 20.0
     cases: Sequence[Case] = CASES
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """Run the system in each case and return the result; raises LaunchFailed.
+    """Run the system in each case and return the results; raises LaunchFailed if a system fails or does not end.
 
-    Keys: "seconds", duration of each run [s]; "speed", speed of this machine in multiples of that of the standard machine (the one for
-    which the requirements were set); "runs", list of the numbers of each run, as `judged_run` returns them; "passed", whether all runs
-    passed.
+    Keys: "seconds", duration of each run [s]; "speed", median speed of this machine in multiples of that of the standard machine (the one
+    for which the requirements were set); "runs", a list with the dict that `judged_run` returns for each case; "passed", whether every run
+    is repeatable and at least as fast as required.
     """
     runs = []
     with Progress() as progress, Crew(HELPERS) as crew:
@@ -76,9 +77,12 @@ def _run(case: Case, seconds: float) -> dict[str, Any]:
 def judged_run(case: Case, summary: Mapping[str, Any], speed: float) -> dict[str, Any]:
     """Return the numbers of one run and whether it is fast enough and repeatable.
 
-    `summary`: the summary of the run.  `speed`: speed of this machine in multiples of that of the standard machine (the one for which the
-    requirements were set).  Main keys: "speed", in multiples of real time; "standard_speed", the same on the standard machine;
-    "repeatable", whether the summary says that the run can be repeated exactly; "passed".
+    `summary`: the launcher's summary of the run.  `speed`: speed of this machine in multiples of that of the standard machine (the one for
+    which the requirements were set).
+
+    Keys: the fields of `Case`; "speed", in multiples of real time; "standard_speed", the same on the standard machine; "ticks_per_second";
+    "ticks" and "transitions" (of all agents), numbers; "repeatable", whether the summary says that the run can be repeated exactly;
+    "passed", whether it is repeatable and has at least the required speed.
     """
     lockstep, agents = summary["lockstep"], summary["agents"]
     standard = lockstep["speed"] / speed
@@ -95,9 +99,9 @@ def judged_run(case: Case, summary: Mapping[str, Any], speed: float) -> dict[str
 
 
 def engine_ratios(runs: Sequence[Mapping[str, Any]]) -> dict[int, float]:
-    """Return the speed of MuJoCo over the speed of PyBullet, by rate [Hz], for the rates at which both were run.
+    """Return the speed of MuJoCo over the speed of PyBullet, by tick rate [Hz], for the rates at which both were run.
 
-    `runs`: results of `judged_run`.
+    `runs`: dicts that `judged_run` returned.
     """
     speeds = {(run["backend"], run["rate"]): run["standard_speed"] for run in runs}
     return {

@@ -95,9 +95,9 @@ REQUIREMENTS = (
 def measure(settings: Settings) -> dict[str, Any]:
     """Run this benchmark and return its result; raises NotInstalled without MuJoCo or python-fcl.
 
-    Main keys: "workload" and "versions" (of all programs); "poses_per_second", "times_mujoco" and "times_python_fcl", rates of the iCub's
-    model and their ratios to the peers' rates; "agreement", the comparisons of contacts; "requirements" and "passed".  `summarized`
-    explains the last ones.
+    Main keys: "workload", and "versions", a dict from a program to its version; "poses_per_second", "times_mujoco" and "times_python_fcl",
+    rates of the iCub's model and their ratios to the peers' rates, as dicts; "agreement", a list with the fields of each `Agreement`
+    (comparison of contacts) as a dict; "requirements" and "passed".  `summarized` explains the last ones.
     """
     load_mujoco()
     robot, with_coal = upper_body(), importlib.util.find_spec("pinocchio") is not None
@@ -140,8 +140,9 @@ def summarized(
     largest depth error [m].  `compared`: the comparisons of contacts with the peers.
 
     Keys: "poses_per_second", "times_mujoco" and "times_python_fcl", each a number by number of objects and contestant, for the iCub;
-    "others", the same tables for each other robot; "requirements", the list of judged requirements, each a dict; "passed", whether all are
-    met and all comparisons have passed; "threads", "depth_error", and "agreement", the last three arguments.
+    "others", the same tables for each other robot; "requirements", a list with the dict that `Requirement.judge` returns for each
+    requirement; "passed", whether all are met and all comparisons have passed; "threads", "depth_error", and "agreement", the last three
+    arguments.
     """
 
     def tables(found: Mapping[int, Rates]) -> dict[str, Any]:

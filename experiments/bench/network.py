@@ -52,8 +52,8 @@ _ALL_SERVICES = ("robot_sim", "model", "controller", "monitor", "recorder", "lau
 class Fault:
     """A disturbance of the network between the hosts.
 
-    `faults`: what happens to its packets.  `unplugged`: whether the network interface of the second host is off.  `seconds`: duration [s];
-    0: as in the settings.
+    `faults`: what happens to the packets.  `unplugged`: whether the network interface of the second host is off.  `seconds`: duration of
+    the disturbance [s]; 0: as in the settings.
     """
 
     name: str
@@ -83,7 +83,7 @@ class Settings:
     """Settings of the benchmark.
 
     `layouts`: keys of LAYOUTS, which say what runs on the second host.  `faults`: names of disturbances in FAULTS.  `seconds`: duration of
-    each disturbance [s].  `rounds`: how often each is repeated.  `seed`: seed of the delayed, lost and reordered packets.
+    each disturbance [s].  `rounds`: how often each disturbance is repeated.  `seed`: seed of the delayed, lost and reordered packets.
     """
 
     layouts: tuple[str, ...] = tuple(LAYOUTS)
@@ -97,12 +97,13 @@ QUICK = Settings(faults=("loss 5 %", "cut", "silent cut"), seconds=3.0)
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """Disturb the network of a system on two hosts and return the result; raises LaunchFailed.
+    """Disturb the network of a system on two hosts and return the result; raises LaunchFailed if a host or a namespace fails.
 
     Main keys: "oldest_ms", age of the oldest command that was obeyed [ms]; "back_s", longest time from the end of a disturbance until all
-    parts moved again [s]; "transitions", dict with the numbers of kept, lost and differing ones on disk; "broken", list of the broken
-    guarantees as text; "rows", the measurements of each disturbance; "passed", whether no guarantee is broken, no transition is lost, and
-    "back_s" is small enough.  If the machine was busy, times do not count.
+    parts moved again [s]; "transitions", dict with the numbers of "kept", "lost" and "differing" ones on disk, and of "gaps" (numbers that
+    occur twice on disk); "broken", list of the broken guarantees as text; "rows", a list with a dict for each disturbance ("layout",
+    "fault" and its measurements); "passed", whether no guarantee is broken, no transition is lost, and "back_s" is small enough.  If the
+    machine was busy, times do not count.
     """
     argv = [sys.executable, "-m", "mobee_system.run", "experiments.bench.network", msgspec.json.encode(asdict(settings)).decode()]
     done = subprocess.run(inside(argv), stdout=subprocess.PIPE, text=True)
@@ -112,7 +113,10 @@ def measure(settings: Settings) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Measure inside a network namespace, with the settings that the command line gives as JSON, and print the result as JSON."""
+    """Run the benchmark inside the network namespace in which `measure` has started this process, and print the result as JSON.
+
+    The first command-line argument has the settings, as JSON.  If a host fails, the error is printed and SystemExit(1) is raised.
+    """
     settings = msgspec.json.decode(sys.argv[1], type=Settings)
     try:
         result = _measured(settings)

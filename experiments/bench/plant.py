@@ -67,9 +67,9 @@ def measure(settings: Settings) -> dict[str, Any]:
     """Run this benchmark and return its result; raises NotInstalled without MuJoCo.
 
     Main keys: "one_arm", "reaching" and "three_agents", each a dict with the median rates of `Pace.numbers` and `Pace.standard`;
-    "mujoco_us_per_tick", and "times_mujoco", MuJoCo's time over ours; "batch", the result of `measure_batch`; "requirements", the list of
-    judged requirements, each a dict; "same_hash", whether two equal runs made the same trajectory; "passed", whether all requirements are
-    met and the hashes are equal.
+    "mujoco_us_per_tick", and "times_mujoco", MuJoCo's time over ours; "batch", the result of `measure_batch`; "requirements", a list with
+    the dict that `Requirement.judge` returns for each requirement; "same_hash", whether two equal runs made the same trajectory; "passed",
+    whether all requirements are met and the hashes are equal.
     """
     load_mujoco()
     runs: dict[str, Callable[[], Pace]] = {

@@ -62,11 +62,15 @@ QUICK = Settings(rounds=1)
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """Run this benchmark and return its result; raises NotInstalled without Chromium or Playwright, and LaunchFailed.
+    """Run this benchmark and return its result; raises NotInstalled without Chromium or Playwright.
 
-    Main keys: "starts", list of the measurements of each start; "slowest_standard_s", time of the slowest robot [s] as it is on the
-    standard machine (the one for which the requirements were set); "ends_clean", whether every system ended without error and left no
-    process; "requirements", the list of judged requirements, each a dict; "passed", whether all are met and the ends were clean.
+    Raises LaunchFailed if a start of a robot does not succeed.
+
+    Main keys: "starts", a list with a dict for each start: "robot"; "steps", times [s] of the steps until the page shows the first action;
+    "standard_s", the time until then as it is on the standard machine; "clean", whether it ended without error; and others;
+    "slowest_standard_s", median time of the slowest robot [s] as it is on the standard machine (the one for which the requirements were
+    set); "ends_clean", whether every system ended without error and left no process; "requirements", a list with the dict that
+    `Requirement.judge` returns for each requirement; "passed", whether all are met and the ends were clean.
     """
     chromium = find_chromium()
     if chromium is None:

@@ -80,12 +80,14 @@ class _Sample:
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """Run the system, read the status of its processes regularly, and return the result; raises LaunchFailed.
+    """Run the system, read the status of its processes regularly, and return the result.
 
-    Main keys: "processes", by process a dict with the growth of memory [MB] and the additional open files and threads; "slower", time of a
-    tick at the end over that at the beginning; "ages", ages of commands [ticks], "first" at the beginning and "last" at the end, and
-    "apart", the difference of both distributions; "restarted", list of the processes that were started again; "passed", whether nothing
-    grew, slowed down or restarted.
+    Raises LaunchFailed if the system fails, or if the run is too short to be judged.
+
+    Main keys: "processes", a dict from a process to a dict with "grown_mb", the growth of memory [MB], "more_files" and "more_threads", the
+    additional open files and threads; "slower", time of a tick at the end over that at the beginning; "ages", ages of commands [ticks],
+    "first" at the beginning and "last" at the end, and "apart", the difference of both distributions; "restarted", list of the processes
+    that were started again; "passed", whether nothing grew, slowed down or restarted.
     """
     ticks, end, samples = _Ticks(), settings.hours * 3600.0, list[_Sample]()
     with Progress() as progress, tempfile.TemporaryDirectory() as scratch, running(Path(scratch), settings.scenario) as system:

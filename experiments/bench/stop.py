@@ -74,12 +74,12 @@ class _Gate:
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """Stop the robot under each flood and return the result; raises LaunchFailed.
+    """Stop the robot under each flood of messages and return the result; raises LaunchFailed if the system or a flood ends early.
 
     Main keys: "floods", list with a dict for each flood: medians and 99th percentiles (endings "_p50" and "_p99") of the times [ms] from a
     stop in the record ("stop_ms") or on the bus ("bus_stop_ms") until the robot reports it, and of the time to connect a client
-    ("connect_ms"); "late" and "late_by_bus", lists of the floods with a 99th percentile above 50 ms by the record or by the bus; "passed",
-    whether no process ended and no flood is late by the record.  If the machine was busy, lateness does not count.
+    ("connect_ms"); "late" and "late_by_bus", lists of the names of the floods with a 99th percentile above 50 ms by the record or by the
+    bus; "passed", whether no process ended and no flood is late by the record.  If the machine was busy, lateness does not count.
     """
     rows = []
     with Progress() as progress, tempfile.TemporaryDirectory() as scratch, running(Path(scratch), "kinematic") as system:

@@ -62,10 +62,10 @@ QUICK = Settings(problems=50, rounds=3, observations=50, large_rounds=1)
 def measure(settings: Settings) -> dict[str, Any]:
     """Run this benchmark and return its result; raises NotInstalled without quantecon.
 
-    Main keys: "us", median time of a plan by solver [us]; "cold_times_scipy" and the like, time of a peer over the time of our plan from
-    zero values ("cold") or from the values of the plan before ("warm"); "difference", largest relative difference from policy iteration;
-    "residual", largest Bellman residual in units of the tolerance; "requirements", the list of judged requirements, each a dict; "passed",
-    whether all are met.
+    Main keys: "us", a dict from a solver to the median time of a plan [us]; "cold_times_scipy" and the like, time of a peer over the time
+    of our plan from zero values ("cold") or from the values of the plan before ("warm"); "difference", largest relative difference from
+    policy iteration; "residual", largest Bellman residual in units of the tolerance; "requirements", a list with the dict that
+    `Requirement.judge` returns for each requirement; "passed", whether all are met.
     """
     load_quantecon()
     with one_core() as core, Progress() as progress:

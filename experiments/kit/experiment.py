@@ -55,11 +55,22 @@ _PAIR = " / "  # between the names of two settings that vary together
 
 
 def verdict_of(holds: Holds | Envelope, is_aim: bool = False, untested: bool = True) -> Verdict:
-    """Return the verdict on a claim from its outcome, or from its outcomes in several settings; `is_aim`: the claim is an aim of our own.
+    """Return the verdict on a claim from its outcome in one setting, or from its outcomes in several settings.
 
-    A claim that holds in some settings and fails in others depends on the settings.  A claim that fails in all settings is refuted if there
-    are at least two settings and `untested` is false, else it is not reproduced; `untested` is true if the experiment did not vary
-    something that the publications leave open and that could explain a failure.  An aim that fails in one setting is not met.
+    An aim of our own is "not met" if it fails in any setting, else "open" if any outcome is None or there is no setting, else "met".  A
+    published claim gets the first of these that applies:
+
+    - "depends": it holds in some settings and fails in others.
+    - "open": an outcome is None, or there is no setting.
+    - "refuted": it fails in all settings, there are at least two, and `untested` is false.
+    - "not reproduced": it fails in all settings.
+    - "stronger": the outcome is "stronger" in all settings.
+    - "confirmed": it holds in all settings.
+
+    Args:
+        holds: the outcome in the only setting; or an Envelope with the outcome of each setting.
+        is_aim: whether the claim is an aim of our own.
+        untested: whether a failure could have a cause that the publications leave open and that the experiment kept fixed.
     """
     each = list(holds.holds.values()) if isinstance(holds, Envelope) else [holds]
     fails, undecided = False in each, None in each or not each
@@ -77,7 +88,8 @@ def verdict_of(holds: Holds | Envelope, is_aim: bool = False, untested: bool = T
 def in_settings(what: str, rule: Rule, settings: Mapping[str, Any]) -> Measured | None:
     """Judge a claim by its rule in each of several settings; returns None if the rule returns None in all settings.
 
-    `what`: what differs between the settings, as "unit of distance".  `settings`: the runs in each setting, by its name.
+    A rule returns None if there are too few runs.  `what`: what differs between the settings, as "unit of distance".  `settings`: the runs
+    in each setting, by its name.
 
     Returns a text and an outcome.  The text has our numbers in the first setting, and in each other setting whose outcome differs from that
     of the first.  The outcome is an Envelope with the outcome of each setting; if only one setting has enough runs, it is that setting's
@@ -175,7 +187,7 @@ def claim(source: str, text: str, published: str, varies: str = "", untested: st
 
 
 def judged(claims: Iterable[Claim], runs: Any, complete: bool = True) -> list[dict[str, Any]]:
-    """Return the claims as dicts, measured and judged by their rules from `runs`.
+    """Return the claims as dicts (see `Claim.record`), measured and judged by their rules from `runs`.
 
     `complete`: whether the runs suffice.  If they do not, the rules are not called, and all claims keep their text without measured
     numbers.
@@ -202,7 +214,7 @@ class Method(Protocol):
     """The functions that run an experiment and draw its figure.
 
     `run` writes into the folder of a run.  It may be interrupted at any time: finished parts are on disk, and the next call continues after
-    them.  If the results that it returns have the value False under "passed", `mobee experiment run` fails.
+    them.  If the results that it returns have the value False under "passed", the command `mobee experiment run` fails.
     """
 
     @property
@@ -216,9 +228,11 @@ class Method(Protocol):
         """Run the experiment with these options, and return its results as JSON values; `folder`: where it writes what is finished."""
 
     def recorded(self, folder: Path) -> AbstractContextManager[Path]:
-        """Return a context manager that yields a folder with the files of a finished run that match `kept`, for its raw record.
+        """Return a context manager that yields the folder from which the raw record of a finished run is copied.
 
-        `folder`: folder of the run.  The yielded folder is `folder` itself, or a temporary folder in which the values are reduced.
+        The raw record is the copy of those files that match `kept`; the results can be computed from it again.  `folder`: folder of the
+        run.  The yielded folder is `folder` itself, which has other files, too; or, if the experiment keeps only a summary of its values, a
+        temporary folder with files that have the summary, which is deleted when the context ends.
         """
 
     def results(self, folder: Path) -> dict[str, Any]:
@@ -233,8 +247,9 @@ class Steps:
     """A `Method` made of functions, for an experiment that is not a sweep.
 
     `add_arguments`, `run`, `figure`, `kept`: as in `Method`.  `recomputed`: function that computes the results from the folder of a run;
-    None for an experiment without claims.  `summary`: function that reduces the values of each cell for the raw record, if the files `kept`
-    are cells; the reduced values must give the same results, and must not change if they are reduced again.
+    None for an experiment without claims.  `summary`: function that replaces the values of each cell (a finished part of a run) by a
+    summary of them, for the raw record, if the files `kept` are cells; the summary must give the same results, and must not change if it is
+    summarised again.
     """
 
     add_arguments: Callable[[argparse.ArgumentParser], None]
@@ -245,7 +260,10 @@ class Steps:
     summary: Callable[[dict[str, Any]], dict[str, Any]] | None = None
 
     def recorded(self, folder: Path) -> AbstractContextManager[Path]:
-        """Return a context manager that yields the run's folder, or, if there is a `summary`, a temporary folder with the reduced cells."""
+        """Return a context manager that yields the folder from which the raw record of a run is copied, as in `Method.recorded`.
+
+        It is the run's folder; or, if there is a `summary`, a temporary folder with the summaries of the cells.
+        """
         return nullcontext(folder) if self.summary is None else reduced_cells(folder, self.summary)
 
     def results(self, folder: Path) -> dict[str, Any]:

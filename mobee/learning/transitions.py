@@ -97,7 +97,10 @@ class DebiasedCounts(Tabled):
 
     @property
     def probabilities(self) -> Array:
-        """The probability of each outcome, shape (S, A, B): the sum over B is 1, or 0 where there is no action (read only)."""
+        """The probability of each outcome, shape (S, A, B): the sum over B is 1, or 0 where there is no action (read only).
+
+        B is the largest number of distinct outcomes of a state-action.
+        """
         return read_only(self._probabilities)
 
     def update(self, counts: OutcomeCounts, state: int, action: int) -> None:
@@ -214,10 +217,13 @@ class TransitionModel(Tabled):
 
     @property
     def reward(self) -> Array:
-        """The information gain of each state-action's last observation, shape (S, A), in nats; -inf where there is no action (read only).
+        """The information gain of each state-action's last observation, shape (S, A) [nats]; -inf where there is no action (read only).
 
-        Before the first try it is the gain of an imagined success. With a detector it increases if a neighbour's outcomes seem to have
-        changed.
+        Before the first try it is the gain of an imagined success. If `divergence` is a function, its value stands in place of the gain.
+
+        With the detector "run_length", an observation can raise the gain of other state-actions that have been tried. This happens if the
+        outcomes of the observed state-action seem to have changed, for the actions with the same goal and the action from this goal back to
+        the state.
         """
         return read_only(self._reward)
 
@@ -252,21 +258,24 @@ class TransitionModel(Tabled):
 
     @property
     def totals(self) -> Array:
-        """The sum of counts N in the closed form of the reward (eq. 6.5), shape (S, A); 0 where there is no action (read only)."""
+        """The sum N of the counts of each state-action in the closed form of the reward (eq. 6.5), shape (S, A).
+
+        It is 0 where there is no action. The array is read only.
+        """
         return read_only(self._totals)
 
     @property
     def imagined(self) -> Array:
         """The imagined part of each bin's count, shape (B,): of staying, of reaching the goal, and of further outcomes (read only).
 
-        A bin is one distinct outcome of a state-action; the imagined part is the same for all state-actions.
+        A bin is one distinct outcome of a state-action, B the largest number of bins; the imagined part is the same for all state-actions.
         """
         return read_only(self._imagined)
 
     def bins(self, state: int, action: int) -> tuple[Ints, Array]:
         """Return the outcome states of a state-action and their counts T(s, a), both (bins,), in order of first observation.
 
-        Imagined observations are included.
+        `bins`: number of distinct outcomes of the state-action. Imagined observations are included.
         """
         self.space.goal(state, action)
         used = self._bins[state, action]
@@ -275,8 +284,9 @@ class TransitionModel(Tabled):
     def debiased(self, goal: float = 0.3, stay: float = 0.1) -> DebiasedCounts:
         """Return outcome probabilities for plans: from the real counts and a weak prior. Later observations of this model update them.
 
-        `goal`, `stay`: imagined counts of success (above 0) and of failure (at least 0), in place of the imagined counts of Algorithm 8.
-        For the same numbers the same object is returned. Raises InvalidValue for a number out of its range.
+        `goal`, `stay`: imagined counts of an action's success (it ends in its goal, above 0) and of its failure (it stays, at least 0), in
+        place of the imagined counts of Algorithm 8. For the same two numbers the same object is returned. Raises InvalidValue for a number
+        out of its range.
         """
         if not (0.0 < goal < np.inf and 0.0 <= stay < np.inf):
             raise InvalidValue(f"goal={goal!r}, stay={stay!r}: give counts, the first above 0 and the second at least 0.")
@@ -332,7 +342,7 @@ class TransitionModel(Tabled):
         return max(0.0, kl_divergence(after, before))
 
     def _observe_since_change(self, state: int, action: int, outcome: int) -> float:
-        """Count one transition, and forget the outcomes before a change; the rewards of suspect neighbours rise."""
+        """Count one transition, and forget the outcomes before a change; the rewards of other state-actions that may have changed rise."""
         assert self._runs is not None
         reward, chosen = self._gain_since_change(state, action, outcome), self._bin(state, action, outcome)
         if chosen == self._outcomes.shape[2]:

@@ -45,8 +45,9 @@ def reference(path: ArrayLike, speeds: ArrayLike, accelerations: ArrayLike, roun
         path: (K, n) rad, corners that straight lines join.
         speeds: (n,) rad/s, largest speeds.
         accelerations: (n,) rad/s^2, largest accelerations.
-        rounding: distance before and after a corner at which the motion leaves the path [rad, Euclidean over all motors], at most half the
-            distance to the next corner; the motion passes the corner at no more than half this distance.  0: it stops at every corner.
+        rounding: distance from a corner [rad, Euclidean over all motors] at which the motion leaves the straight line and joins the next
+            one. It is reduced to half the length of the shorter line at the corner. The curve between the lines passes the corner at half
+            this distance or less. 0: the motion stops at every corner.
         dt: time between two rows of the result [s].
 
     Raises:
@@ -78,7 +79,8 @@ def reference(path: ArrayLike, speeds: ArrayLike, accelerations: ArrayLike, roun
 def rounded(corners: ArrayLike, rounding: float) -> Array:
     """Return points (S, n) along a path with corners (K, n) rad: straight lines, with a parabola at each corner.
 
-    `rounding`: distance before and after a corner at which the parabola begins and ends [rad]. The points are about STEP (0.002 rad) apart.
+    `rounding`: distance before and after a corner at which the parabola begins and ends [rad]; it is reduced to half the length of the
+    shorter line at the corner. The points are about STEP (0.002 rad) apart.
     """
     points = real_array("corners", corners)
     steps = np.diff(points, axis=0)
@@ -339,9 +341,9 @@ def moving(robot: Robot, path: Array) -> tuple[str, ...]:
 
 
 def carrying(robot: Robot, motors: Sequence[str]) -> tuple[str, ...]:
-    """Return the names of the parts that the given motors belong to, and of the parts that carry these.
+    """Return the names of the parts that the given motors belong to, and of the parts that carry these parts.
 
-    For the motors of the iCub's arm, these are the arm and the torso. `motors`: names.
+    For the motors of the iCub's arm, these are the arm and the torso. `motors`: names of motors.
     """
     moves = np.isin(robot.motors, motors) @ np.abs(tables(robot).coupling) > 0.0  # (J,)
     above = np.zeros(len(robot.joints), dtype=bool)

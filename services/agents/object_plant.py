@@ -30,7 +30,7 @@ class ObjectPlant(PerceivingPlant):
 
     Pictures that were taken before the end of the motion do not count. If the object is not seen, the part moves to the posture `aside` of
     the settings, and the action ends there. If the object is not seen in its area from there either, it has fallen or left: the simulator,
-    or a person, puts it back, and the action ends when it is back. So an outcome always holds what was seen after the action.
+    or a person, puts it back, and the action ends when it is back. So an outcome always contains what was seen after the action.
 
     Args:
         service: the service of the agent.
@@ -64,8 +64,8 @@ class ObjectPlant(PerceivingPlant):
     def act(self, part: str, target: Array) -> Outcome:
         """Set the part's attractor to `target` (n_part,) rad, wait until the part settles or times out, then look at the object.
 
-        Implements `mobee.plant.Plant.act`. The outcome holds the position of the object after the action, and the posture from which it was
-        seen.
+        Implements `mobee.plant.Plant.act`. The outcome contains the position of the object after the action, and the posture from which it
+        was seen.
         """
         outcome = self.plant.act(part, target)
         q = self.plant.measure(part) if self._look() else outcome.q

@@ -68,8 +68,8 @@ class Behaviour:
     """Runs a behaviour: in each step, moves the attractor of its part (the posture to which the part moves) as the function `step` says.
 
     `step(scene)`: returns the attractor (n_part,) rad and its velocity (n_part,) rad/s. `reset()`: ends the present motion. If the target
-    has no new position for the time `patience` of the settings, the part holds; if `watches_last_place` is True, the behaviour continues
-    instead as if the target were at rest at its last position.
+    has no new position for the time `patience` of the settings, the part stays where it is; if `watches_last_place` is True, the behaviour
+    continues instead as if the target were at rest at its last position.
     """
 
     def __init__(
@@ -148,7 +148,7 @@ class Behaviour:
         self._times.add(1e3 * (time.perf_counter() - begin))
 
     def _wait(self, q: Array, now: float, dt: float) -> None:
-        """Hold the part, or keep it directed at the last place of the target; release it when there was no target for long."""
+        """Let the part rest, or keep it directed at the last place of the target; release it when there was no target for long."""
         if not self._part.is_owned:
             self._reset()
             self._hold = None

@@ -104,7 +104,7 @@ class Publisher(Generic[_M]):
 
 
 class Latest(Generic[_M]):
-    """Holds the newest message of a stream until it is read; older ones are overwritten, never queued."""
+    """Stores the newest message of a stream until it is read; older ones are overwritten, never queued."""
 
     def __init__(self, bus: Bus, key: str, cls: type[_M], part: str | None) -> None:
         self._bus, self._cls, self._part = bus, cls, part
@@ -176,18 +176,23 @@ class Bus:
         """Return a publisher of a stream.
 
         Args:
-            cls: type of the messages; its `stream` holds key and delivery class.
+            cls: type of the messages; its `stream` contains key and delivery class.
             name: the variable in its key, such as the part.
             delivery: another delivery class than the message's own.
         """
         return Publisher(self, cls.stream.key(name), cls, delivery or cls.stream.delivery)
 
     def latest(self, cls: type[_M], name: str = "*") -> Latest[_M]:
-        """Return an object that holds the newest message of a stream; `name`: the variable in its key, such as the part; by default any."""
+        """Return an object that stores the newest message of a stream.
+
+        `name`: the variable in the key of the stream, such as the part; by default any.
+        """
         return Latest(self, cls.stream.keys(name), cls, part_of(cls, name))
 
     def receive(self, cls: type[_M], sample: zenoh.Sample, part: str | None = None, *, any_run: bool = False) -> _M | None:
-        """Return the message of the type `cls` in a sample of Zenoh; None if it is refused, which is counted and published as a warning.
+        """Return the message of the type `cls` in a sample (the received bytes and their key); None if it is refused.
+
+        A refusal is counted and published as a warning.
 
         `part`: the part whose number of motors the vectors must have; None: not checked. `any_run`: accept also a message of another run of
         robot_sim. Before the first clock message the run is not known: without `any_run` the result is then None, and nothing is counted.

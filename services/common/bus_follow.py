@@ -62,8 +62,8 @@ class BusFollower(BusPlant):
     def take(self, parts: Sequence[str]) -> None:
         """Take the ownership of the goals of `parts` (the right to set their attractors), and wait until these parts are under control.
 
-        A part is under control when robot_sim follows the controller's commands to it. Raises MobeeError if a part is still in hold after
-        TAKE_TIMEOUT (8 s), or if its goal belongs to another service.
+        A part is under control when robot_sim follows the controller's commands to it. Raises MobeeError if a part is still in hold (it
+        stands still and follows no commands) after TAKE_TIMEOUT (8 s), or if its goal belongs to another service.
         """
         give_up = time.monotonic() + TAKE_TIMEOUT
         while not self._has(parts):
@@ -85,8 +85,8 @@ class BusFollower(BusPlant):
             period: time from one row to the next, s of the robot's clock. If the process is late, rows are skipped, but never the last one.
             progress: called with the share of the rows, 0 to 1, that have been set.
 
-        Raises ActionInterrupted if a part is in hold or was taken by another service, if the controller ends, if robot_sim starts a new
-        run, or if the robot's clock stands still. Call `let_go` afterwards.
+        Raises ActionInterrupted if a part is in hold (it stands still and follows no commands) or was taken by another service, if the
+        controller ends, if robot_sim starts a new run, or if the robot's clock stands still. Call `let_go` afterwards.
         """
         begun, run, last = self._now, self._runs, len(attractors) - 1
         self._seen.clear()

@@ -263,8 +263,9 @@ class BusPlant:
         """Set the part's attractor to `target` (n_part,) rad, and wait until the part has settled or timed out; return the outcome.
 
         Implements `mobee.plant.Plant.act`. If the controller ends, the action continues as soon as another controller has the part under
-        control. Raises InvalidValue for a target beyond the limits; ActionInterrupted on a hold, a fault or a new run, if no controller
-        can continue within 10 s, and if the controller gives the goal to another service.
+        control. Raises InvalidValue for a target beyond the limits; ActionInterrupted if the part is in hold (it stands still and follows
+        no commands), on a fault or a new run, if no controller can continue within 10 s, and if the controller gives the goal to another
+        service.
         """
         sent = self._perform(part, "goal", Goal, q=[float(x) for x in target])
         return self._outcome(part, sent)
@@ -291,7 +292,7 @@ class BusPlant:
         """Return the positions (3,) m, root frame, of the free objects in the model's world, by name.
 
         These are the objects of the world's file and those that vision perceives. Objects that are attached to a link, and perceived
-        objects that are stale, are left out. An agent whose states hold the position of an object uses it as `PerceivingPlant(plant,
+        objects that are stale, are left out. An agent whose states contain the position of an object uses it as `PerceivingPlant(plant,
         plant.places)`. Raises ActionInterrupted if the model does not answer.
         """
         return {name: np.array(one.position) for name, one in self.objects().items()}
@@ -309,7 +310,8 @@ class BusPlant:
 
         Then the attractor pulls the part back, or, with `stay`, the part stays where the force ended. Implements
         `mobee.reach.ReachPlant.reach`. Raises InvalidValue if no target is presented or the part does not move the marker;
-        ActionInterrupted on a hold, a fault or a new run, if the controller ends, and if it gives the goal to another service.
+        ActionInterrupted if the part is in hold (it stands still and follows no commands), on a fault or a new run, if the controller ends,
+        and if it gives the goal to another service.
         """
         self.robot.marker(marker)
         sent = self._perform(part, "reach", ReachFor, marker=marker, stay=stay, **self._reaches.asked())
@@ -350,8 +352,8 @@ class BusPlant:
     def _send_again(self, part: str, run: int, sent: Sent, **fields: object) -> Sent:
         """Continue an action whose controller has ended: send its goal to the next controller, once that has the part under control.
 
-        As after a short hold, the part rests on the path to its goal.  Raises ActionInterrupted after SEND_AGAIN_WITHIN, an emergency
-        stop, a new run or a request to rest: then the part must not move to an old goal.
+        As after a short hold (time without commands), the part rests on the path to its goal. Raises ActionInterrupted after
+        SEND_AGAIN_WITHIN, an emergency stop, a new run or a request to rest: then the part must not move to an old goal.
         """
         self._epochs.pop(part, None)
         motion = self._motion.get(part)

@@ -56,7 +56,7 @@ class KeyFolder:
         """Make an authority, and a key and a certificate for each identity, in a new or empty folder; return the folder.
 
         `identities`: pairs of name and party, with the party None for the router. `days`: number of days for which their certificates are
-        valid. Raises BadKeys if the folder holds files, OSError if it cannot be written.
+        valid. Raises BadKeys if the folder contains files, OSError if it cannot be written.
         """
         if path.exists() and any(path.iterdir()):
             raise BadKeys(

@@ -39,9 +39,9 @@ class Stop(Struct, frozen=True):
 
 
 def replaces(new: Stop, old: Stop | None) -> bool:
-    """Return whether a new stop replaces the old one in the record: if `old` is None, or if `old` is by the launcher and `new` is not.
+    """Return whether a new stop replaces the old one in the record: if there is no old one, or only the old one is by the launcher.
 
-    A stop by the launcher ends with its launch; a stop by another process stays.
+    A stop by the launcher ends with the run of the system that it has launched; a stop by another process stays.
     """
     return old is None or (old.source == BY_LAUNCHER and new.source != BY_LAUNCHER)
 
@@ -68,17 +68,17 @@ class StopRecord:
 
     @property
     def path(self) -> Path:
-        """Path of the file."""
+        """Path of the file in which the emergency stop is recorded."""
         return self._path
 
     def create(self) -> None:
-        """Make the file, which then says that the robot is released, unless there is a file; raises OSError."""
+        """Make the file, which then records that the robot is released; an existing file stays. Raises OSError if it cannot be written."""
         if not self._path.exists():
             self._path.parent.mkdir(parents=True, exist_ok=True)
             self.release()
 
     def remove(self) -> None:
-        """Remove the record at the end of a launch, unless a stop is in force; raises OSError."""
+        """Remove the record at the end of a run of the launcher, unless a stop is in force; raises OSError if that is impossible."""
         if self.read() is None:
             self._path.unlink(missing_ok=True)
 
@@ -95,7 +95,7 @@ class StopRecord:
     def new_stop(self) -> Stop | None:
         """Return the stop in force if the file has changed since the last call; otherwise None.
 
-        A file that does not exist is no stop here, because a launch removes the file when it ends.
+        A file that does not exist is no stop here, because the launcher removes the file when its run ends.
         """
         try:
             found = self._path.stat()
@@ -107,9 +107,11 @@ class StopRecord:
         return self.read() if self._path.exists() else None
 
     def stop(self, source: str, reason: str) -> bool:
-        """Record a new stop. It replaces a stop in force only if that one is by the launcher and the new one is not.
+        """Record a new stop, and return whether there is a file.
 
-        Returns False if there is no file; then no robot watches the record. Raises OSError if the file cannot be written.
+        If a stop is in force already, it is replaced only if the launcher has set it and `source` is another process; else it stays. True
+        is returned in all these cases. False: there is no file; then no robot watches the record. Raises OSError if the file cannot be
+        written.
         """
         if not self._path.exists():
             return False
@@ -119,11 +121,11 @@ class StopRecord:
         return True
 
     def latch(self, stop: Stop) -> None:
-        """Record a stop in place of the present content of the file; raises OSError."""
+        """Record a stop in place of the present content of the file; raises OSError if the file cannot be written."""
         self._write({"stopped": True, "source": stop.source, "reason": stop.reason, "time": stop.time})
 
     def release(self) -> None:
-        """Record that the robot is released; raises OSError."""
+        """Record that the robot is released; raises OSError if the file cannot be written."""
         self._write({"stopped": False, "time": time.time(), "monotonic_ns": time.monotonic_ns()})
 
     def released_at(self) -> int:
@@ -161,7 +163,7 @@ class StopLine:
     """
 
     def __init__(self, session: zenoh.Session) -> None:
-        """Subscribe to emergency stops; a process that must receive a stop through every flood gives a session of its own."""
+        """Subscribe to emergency stops; a process that must receive a stop through every flood of messages gives a session of its own."""
         self._subscriber = session.declare_subscriber(EStop.stream.key(), RingChannel(_WAITING))
 
     def take(self) -> list[EStop]:

@@ -23,7 +23,7 @@ _SECURED, _PLAIN = "tls/", "tcp/"
 
 
 class BadKeys(MobeeError):
-    """Raised for keys that are missing, unsafe, expired or of another authority; the message holds the remedy."""
+    """Raised for keys that are missing, unsafe, expired or of another authority; the message contains the remedy."""
 
 
 @dataclass(frozen=True, slots=True)

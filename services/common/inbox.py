@@ -20,9 +20,9 @@ GRACE = 0.002  # s for which `spin` handles waiting messages after its time is o
 
 
 class Newest:
-    """A slot for the newest sample of a stream. A new sample replaces one that was not handled yet.
+    """A slot for the newest sample (received message) of a stream. A new sample replaces one that was not handled yet.
 
-    The inbox therefore holds at most one handler of the stream.
+    The inbox therefore contains at most one handler of the stream.
     """
 
     def __init__(self, inbox: Inbox, handle: Callable[[Any], None]) -> None:
@@ -30,7 +30,7 @@ class Newest:
         self._sample: Any = None
 
     def offer(self, sample: Any) -> None:
-        """Store a sample, and queue its handler in the inbox if it is not queued yet; Zenoh's thread calls this."""
+        """Store a sample (received message), and queue its handler in the inbox if it is not queued yet; Zenoh's thread calls this."""
         with self._lock:
             waiting, self._sample = self._sample is not None, sample
         if not waiting:

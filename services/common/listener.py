@@ -93,7 +93,10 @@ class Listener:
             self._subscribe(key, enqueue)
 
     def _newest(self, handle: Callable[[zenoh.Sample], None]) -> Callable[[zenoh.Sample], None]:
-        """Return a callback that handles only the newest sample; in lockstep every sample, since a slot would reorder two streams."""
+        """Return a callback that handles only the newest sample (received message) of a stream.
+
+        In lockstep it handles every sample, since a slot for one would reorder two streams.
+        """
         slot = Newest(self.inbox, handle)
 
         def offer(sample: zenoh.Sample) -> None:

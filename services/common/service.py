@@ -170,7 +170,7 @@ class Service(Listener):
     def call(
         self, key: str, request: type[Request], reply: type[_R], *, timeout: float | None = None, tries: int = 1, **fields: object
     ) -> _R:
-        """Call another service, wait for the reply and return it; raises services.common.rpc.CallFailed.
+        """Call another service, wait for the reply and return it; raises services.common.rpc.CallFailed if there is no valid reply.
 
         `request`, `reply`: types of request and reply. `fields`: fields of the request. `timeout`: time for each try, s; None: 0.5 s, in
         lockstep 1.5 s. `tries`: how many times the call is sent while there is no answer; it has its effect at most once.
@@ -202,8 +202,8 @@ class Service(Listener):
     def ready(self) -> None:
         """Declare the liveliness token of this service; call this after all subscriptions and calls are declared.
 
-        A robot_sim, model, controller or port_filter that no launcher has started ends (SystemExit) if another process of the same name
-        answers.
+        If this is a robot_sim, model, controller or port_filter and no launcher has started it, the method first asks whether another
+        process of the same name is ready. If one answers that it is, the method raises SystemExit, because both would be obeyed.
         """
         if self.who in ONLY_ONE and not self._launcher:
             self._require_no_other()
@@ -265,7 +265,7 @@ class Service(Listener):
             raise SystemExit(ENVIRONMENT)
 
     def _missing(self) -> str:
-        """Return which process this service cannot be without and does not see; empty if it sees it.
+        """Return the name of the process that this service needs and does not see; empty if it sees it.
 
         On a host that has joined, the launcher of that host decides: the router may be beyond a cut of the network for any time.
         """
@@ -293,7 +293,7 @@ class Service(Listener):
             handler(who, instance, up)
 
     def _join(self, router: str) -> None:
-        """Record the router; if a second one appears, ask which answers: a service must not join a system that was started later."""
+        """Record the router; if a second one appears, ask which one answers: a service must not join a system that started later."""
         if not self._router:
             self._router = router
         elif router != self._router:

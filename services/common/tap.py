@@ -68,7 +68,7 @@ class Tap:
 
 
 def _published(sample: zenoh.Sample, otherwise: int) -> int:
-    """Return the time of a sample, ns since 1970."""
+    """Return the time at which a received message (sample) was sent, ns since 1970; `otherwise`: result if it has no time."""
     return otherwise if sample.timestamp is None else int(sample.timestamp.get_time_as_ntp64().as_nanos())
 
 

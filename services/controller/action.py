@@ -29,8 +29,9 @@ class Owner:
 class Action:
     """The owner of a part's goal (the right to set its attractor), and the part's newest action with its status.
 
-    `id`: id of the action; empty: none. `status`: idle, moving, settled, timeout, suspended or held. `since_k`, `start_k`: ticks at which
-    the status and the action began. Times are in s of the bus clock.
+    `id`: id of the action; empty: none. `status`: idle, moving, settled, timeout, suspended or held; in the last two the part stands still
+    and does not follow the controller's commands. `since_k`, `start_k`: ticks at which the status and the action began. Times are in s of
+    the bus clock.
     """
 
     def __init__(self, settle: Settle) -> None:
@@ -64,9 +65,9 @@ class Action:
     def may_continue(self, t: float, gate: GateState) -> bool:
         """Return whether the action may continue when the part is under control again.
 
-        `t`: present time [s]. `gate`: state of the part's gate. A short hold leaves the part at rest on the path to its goal. After an
-        emergency stop or a fault, after a hold of more than 10 s, and at the sixth hold of the action, the part must not move to the old
-        goal.
+        `t`: present time [s]. `gate`: state of the part's gate. In a hold the part stands still and does not follow the controller's
+        commands. A short hold leaves it at rest on the path to its goal. After an emergency stop or a fault, after a hold of more than 10
+        s, and at the sixth hold of the action, the part must not move to the old goal.
         """
         if self.target is None or gate in ("estop", "fault"):
             return False

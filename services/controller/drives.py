@@ -95,7 +95,10 @@ class Drives:
         return self._stop is not None
 
     def can_arm(self, state: PartStatus) -> bool:
-        """Return whether a part in this state may be taken and armed: no stop is in force, and its gate is idle, in hold or armed."""
+        """Return whether a part in this state may be taken and armed: no stop is in force, and its gate is idle, in hold or armed.
+
+        A part in hold stands still until it is armed; an armed one follows commands.
+        """
         return self._stop is None and state.gate in ("idle", "hold", "armed")
 
     def try_arm(self, part: str, state: PartStatus) -> None:

@@ -27,7 +27,7 @@ WARM_UP_TICK = 0.01  # s
 
 
 class RobotLaw:
-    """Holds the state of the control law and all its inputs: measured positions, forces of model and clients, attractors, reaches.
+    """Keeps the state of the control law and all its inputs: measured positions, forces of model and clients, attractors, reaches.
 
     The other objects of the controller change the law only by these methods.
     """
@@ -55,7 +55,7 @@ class RobotLaw:
     # Ticks
 
     def reset(self) -> None:
-        """Reset the law at the start of a run: at rest at home, and without forces of the model."""
+        """Reset the law at the start of a run: the robot is at rest at home, and no forces of the model are in force."""
         self.forces.forget()
         self._last_k, self._last_tick = -1, None
         self._law.reset(self._robot.home)
@@ -161,7 +161,7 @@ class RobotLaw:
         self._law.reach_toward(part, marker, target)
 
     def end_reach(self, part: str) -> None:
-        """End the force of the part's reach; nothing happens if the part does not reach."""
+        """End the force of the part's reach; nothing happens if the part has no reach."""
         self._law.end_reach(part)
 
     def is_approaching(self, part: str) -> bool:
@@ -173,20 +173,26 @@ class RobotLaw:
         return self._law.model.evaluate(self.q).position(marker)
 
     def set_client_force(self, part: str, force: Array) -> None:
-        """Set a client's joint-space force on a part, (n_part,) rad/s^2 (thesis eq. 5.9)."""
+        """Set the joint-space force of a client on a part, (n_part,) rad/s^2 (thesis eq. 5.9).
+
+        A client is another process that commands the robot. The force replaces the one that was set before for this part.
+        """
         self._client_forces[self._where[part]] = force
         self._apply_client_forces()
 
     def set_push(self, part: str, marker: str, push: Array) -> None:
-        """Set a client's force at a marker of a part, (3,) m/s^2, root frame (thesis eq. 5.10).
+        """Set the force of a client at a marker, for a part, (3,) m/s^2, root frame (thesis eq. 5.10).
 
-        The pushes of several clients at one marker are added.
+        A client is another process that commands the robot. The pushes at one marker that were set for several parts are added.
         """
         self._pushes.setdefault(part, {})[marker] = push
         self._apply_client_forces()
 
     def clear_client_forces(self, part: str) -> None:
-        """End the joint-space force and all pushes of a part's client. The part's reach and forces on other parts continue."""
+        """End the joint-space force and all pushes that a client has set for a part.
+
+        The reach of the part continues. So do forces and pushes that were set for other parts.
+        """
         self._client_forces[self._where[part]] = 0.0
         self._pushes.pop(part, None)
         self._apply_client_forces()

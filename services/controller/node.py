@@ -33,7 +33,7 @@ from services.controller.reaches import Reaches
 class ControllerNode:
     """Waits for the forces of a tick, steps the control law, and commands the parts that are under control.
 
-    Each object is changed only by its own methods: `RobotLaw` holds the law's state, `Action` the goal and status of one part, `Drives` the
+    Each object is changed only by its own methods: `RobotLaw` keeps the law's state, `Action` the goal and status of one part, `Drives` the
     epochs at robot_sim, `Reaches` the reaches in progress.
     """
 
@@ -157,7 +157,10 @@ class ControllerNode:
         action.resume(tick.k)
 
     def _control(self, tick: Tick, fresh: bool) -> tuple[dict[str, Order], Array]:
-        """Return the orders to the parts, and their reference (n,); without fresh forces, every part that follows is ordered to hold."""
+        """Return the orders to the parts, and their reference (n,).
+
+        Without fresh forces, every part that follows commands is ordered to hold (to brake and stand still).
+        """
         ticks = self._law.count_ticks(tick.k)
         self._counters.ticks += 1
         self._counters.long_gaps += ticks > MAX_TICKS

@@ -87,7 +87,10 @@ class BusBody(BusFollower):
         self._calm()
 
     def _step(self, q: Array) -> None:
-        """Set the attractors of the parts to those of q (n,) rad; after a hold, as soon as the parts are under control again."""
+        """Set the attractors of the parts to those of q (n,) rad.
+
+        After a hold, in which parts stand still and follow no commands, this is done as soon as they are under control again.
+        """
         self._require_seen()
         self._goal = np.clip(q, *self.robot.limits.T)
         for left in reversed(range(HOLDS)):

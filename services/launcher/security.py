@@ -22,7 +22,7 @@ _AT_ONCE = 4  # reports of one check: who tries a new key each time must not fil
 
 
 class Security:
-    """The keys of one launch.
+    """The keys of one run of the system (`mobee launch`).
 
     `folder`: folder of the keys. `router`: identity of the router. `access`: access list of the router, which says who may use which keys
     of the bus. `expiring`: texts about identities that expire soon.

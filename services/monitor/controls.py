@@ -144,7 +144,7 @@ class PageControls:
     def tend(self, open_pages: set[str]) -> None:
         """Give parts back to their agents if they are no longer needed; called once per second.
 
-        If the page that holds the controls is not among `open_pages` (ids), all parts that it has taken are given back. A part that has
+        If the page that has the controls is not among `open_pages` (ids), all parts that it has taken are given back. A part that has
         reached for a target is given back 4 s after the reach has ended. A part that another client has taken no longer counts as taken by
         the page.
         """

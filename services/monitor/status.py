@@ -19,9 +19,10 @@ class Seen:
     """What the monitor knows about the state of the system.
 
     `clock_age`: s of real time since the last tick; None: no tick yet. `mode`: mode of the clock, such as "paused". `gates`: state of the
-    safety gate, by part. `held_for`: s of real time for which each part in hold has been held. `why_held`: the controller's reason, by
-    part. `stop`: the emergency stop in force. `services`: running services. `known`: services that have run at some time. `patience`: s of
-    real time without a tick after which the robot counts as not answering. `ended`: the monitor was asked to end.
+    safety gate, by part. `held_for`: s of real time for which each part has been in hold (it stands still and follows no commands).
+    `why_held`: the controller's reason, by part. `stop`: the emergency stop in force. `services`: running services. `known`: services that
+    have run at some time. `patience`: s of real time without a tick after which the robot counts as not answering. `ended`: the monitor was
+    asked to end.
     """
 
     clock_age: float | None = None
@@ -39,8 +40,8 @@ class Seen:
 def banner(seen: Seen) -> dict[str, Any] | None:
     """Return the warning that the page shows in large letters, as a dict of four texts: "level", "title", "text" and "todo".
 
-    "level": kind of warning: ended, waiting, stop, fault, paused or hold. "text": explanation. "todo": remedy. Returns None if there is
-    nothing to warn of.
+    "level": kind of warning: ended, waiting, stop, fault, paused or hold (parts stand still and follow no commands). "text": explanation.
+    "todo": remedy. Returns None if there is nothing to warn of.
     """
     names = sorted(seen.services)
     if seen.ended:

@@ -31,6 +31,8 @@ class Owner:
 class DriveServer:
     """Forwards the drive calls of clients (take, arm, release, hold) to robot_sim, unless the reflex moves the robot.
 
+    The call hold stops a part.
+
     A client gets the epoch (number of the ownership) that robot_sim has given to the filter. `epochs`: the epoch in force, by part.
     """
 
@@ -54,7 +56,9 @@ class DriveServer:
         self.epochs.update(dict.fromkeys(self.epochs, 0))
 
     def hold(self, part: str) -> None:
-        """Put a part in hold at robot_sim. If the part has an owner, this client must arm it again; else any client may take it.
+        """Put a part in hold at robot_sim: it brakes and stands still.
+
+        If the part has an owner, this client must arm it again; else any client may take it.
 
         If robot_sim does not run, nothing is done, because it will start in hold and without owners.
         """

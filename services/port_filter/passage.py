@@ -121,7 +121,7 @@ class Streams:
         self.is_stale = tick.t - min(state.t for state in tick.parts.values()) > MAX_STATE_AGE
 
     def publish(self, tick: Tick) -> None:
-        """Publish a tick to the clients; a part that the reflex controls is shown in hold."""
+        """Publish a tick to the clients; a part that the reflex controls is shown in hold (not under command)."""
         parts = {part: self._for_clients(part, state) for part, state in tick.parts.items()}
         self._tick.put(dt=tick.dt, mode=tick.mode, rate=tick.rate, q=tick.q, parts=parts)
 
@@ -194,7 +194,7 @@ class Streams:
         )
 
     def _for_clients(self, part: str, state: State | PartStatus) -> PartStatus:
-        """Return the status of a part for the clients: in hold while the reflex is active."""
+        """Return the status of a part for the clients: in hold (not under command) while the reflex is active."""
         is_cut = state.gate == "armed" and bool(self._refusal())
         seq = -1 if is_cut else self.commands[part].client_seq(state.cmd_seq)
         return PartStatus(

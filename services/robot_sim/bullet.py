@@ -22,8 +22,9 @@ NO_CONTACT = SolidContact()
 class BulletBackend:
     """The upper body of iCub v2.5 with gravity in PyBullet. Fingers and eyes have no physics, only the motor model.
 
-    A joint is a velocity constraint whose largest torque is that of the motor, so the servo holds the weight, as on the real robot. In
-    torque mode the commanded torque acts on the joint through a gear (bullet_torque.py), and must include the torque that holds the weight.
+    A joint is a velocity constraint whose largest torque is that of the motor, so the servo carries the weight, as on the real robot. In
+    torque mode the commanded torque acts on the joint through a gear (bullet_torque.py), and must include the torque that carries the
+    weight.
     """
 
     name = "pybullet"
@@ -40,7 +41,10 @@ class BulletBackend:
         self._build(seed)
 
     def reset(self, seed: int) -> None:
-        """Put the robot at home, at rest, with all motors in hold, and the world in its initial state; `seed`: of the encoder noise."""
+        """Put the robot at home, at rest, with all motors in hold, and the world in its initial state.
+
+        In hold a motor keeps its position and follows no commands. `seed`: of the encoder noise.
+        """
         self._scene.close()
         self._build(seed)
 

@@ -107,7 +107,7 @@ _EXACT = 1.0 + 1e-9  # factor for rounding: a reference at the limit is within t
 
 
 class Admission:
-    """The checks of the commands to one part; each check raises Refused with its reason."""
+    """The checks of the commands to one part before they are in force; each check raises Refused with its reason."""
 
     def __init__(self, part: str, limits: Limits, dt: float, max_ticks: int | None) -> None:
         """Set the limits.
@@ -187,27 +187,30 @@ def _all(found: NDArray[np.bool_]) -> bool:
 
 
 class Shaper:
-    """Limits the references of a part to the limits of its motors, tick by tick; arrays (n_part,)."""
+    """Limits the references of a part to the limits of its motors, tick by tick; all arrays have the shape (n_part,)."""
 
     def __init__(self, limits: Limits, dt: float) -> None:
         self._limits = limits
         self._asked = Braking(limits.lower, limits.upper, limits.velocity, limits.acceleration * dt, dt)
 
     def start(self, q: Array, velocity: Array) -> None:
-        """Begin at the motors' measured positions [rad] and velocities [rad/s]."""
+        """Begin at the motors' measured positions `q` [rad] and velocities [rad/s], (n_part,) each."""
         self._asked.velocity[:] = np.clip(velocity, -self._limits.velocity, self._limits.velocity)
         self._asked.position[:] = q + self._asked.velocity / SERVO_GAIN  # by which the reference leads a servo at that speed
 
     def to_velocity(self, wanted: Array, q: Array) -> Array:
-        """Return the velocity [rad/s] for this tick, as near to `wanted` as the limits allow; `q`: measured position, rad.
+        """Return the velocity (n_part,) [rad/s] for this tick, as near to `wanted` (n_part,) [rad/s] as the limits allow.
 
-        Near a position limit it is at most the velocity from which the motor can still stop.
+        Near a position limit it is at most the velocity from which the motor can still stop. `q`: measured position, (n_part,) rad.
         """
         self._asked.to_velocity(wanted, q)
         return self._asked.velocity.copy()
 
     def to_position(self, wanted: Array) -> Array:
-        """Return the position [rad] for this tick, on a motion that comes to rest at `wanted` [rad]."""
+        """Advance the commanded position by one tick towards `wanted` (n_part,) [rad], and return it, (n_part,) [rad].
+
+        If `wanted` stays the same in the next ticks, the position comes to rest there.
+        """
         self._asked.to_position(wanted)
         return self._asked.position.copy()
 
@@ -225,7 +228,10 @@ Report = Callable[[str, str, dict[str, float]], None]  # code, text, values
 
 
 class Drive(Struct, frozen=True, eq=False):
-    """Mode and reference of a part's motors in this tick. `reference`: (n_part,) rad, rad/s or N m, by mode; None on hold."""
+    """Mode and reference of a part's motors in this tick.
+
+    `reference`: (n_part,) rad, rad/s or N m, by mode; None in hold, in which the part brakes and stands still.
+    """
 
     mode: Mode
     reference: Array | None = None
@@ -244,9 +250,10 @@ class InForce(Struct, frozen=True):
 class Gate:
     """The safety gate of one part, the last check before its motors.
 
-    States: idle (no owner), hold, armed, fault, estop; the part moves only when armed. Each new owner gets a new epoch, a number that its
-    calls and commands must contain. Commands are admitted between ticks; `tick` returns what the motors do. A command is in force until the
-    next one, or until its ttl is over; then the part brakes at full deceleration, holds where it came to rest, and must be armed again.
+    States: idle (no owner), hold (the part brakes and stands still), armed, fault, estop; the part moves only when armed. Each new owner
+    gets a new epoch, a number that its calls and commands must contain. Commands are admitted between ticks; `tick` returns what the motors
+    do. A command is in force until the next one, or until its ttl is over; then the part brakes at full deceleration, holds where it came
+    to rest, and must be armed again.
     """
 
     def __init__(
@@ -314,17 +321,23 @@ class Gate:
             self._enter("idle", "released")
 
     def hold(self, epoch: int) -> None:
-        """Put the part in hold at the request of its owner; raises Refused if the epoch is not in force."""
+        """Put the part in hold (it brakes and stands still) at the request of its owner; raises Refused if the epoch is not in force."""
         self._check_epoch(epoch)
         self.force_hold("requested by its owner")
 
     def force_hold(self, why: str) -> None:
-        """Put the part in hold at once, if it is armed, without a request of the owner; `why`: reason, for the event."""
+        """Put the part in hold at once, if it is armed, without a request of the owner: it brakes and stands still.
+
+        `why`: reason, for the event.
+        """
         if self.state == "armed":
             self._enter("hold", why)
 
     def lose_owner(self) -> None:
-        """End the ownership and put the part in hold, because the owner's liveliness token has disappeared."""
+        """End the ownership and put the part in hold, because the owner's liveliness token has disappeared.
+
+        In hold the part brakes and stands still.
+        """
         who = self.owner[0] if self.owner else "nobody"
         self.owner = None
         self.force_hold(f"its owner {who} is gone")
@@ -335,7 +348,7 @@ class Gate:
             self._enter("estop", why)
 
     def reset_stop(self) -> None:
-        """End the emergency stop. The part is then in hold, or in fault, and must be armed to move again."""
+        """End the emergency stop. The part then stands still, in the state hold or fault, and must be armed to move again."""
         if self.state == "estop":
             self._enter("fault" if self.faults else "hold", "emergency stop reset")
 
@@ -397,7 +410,7 @@ class Gate:
             raise Refused("age", f"{self.part}: answers a tick that began {delay / 1e6:.0f} ms ago, limit {MAX_AGE * 1e3:.0f} ms")
 
     def _has_expired(self, current: InForce, k: int, now: int) -> bool:
-        """Return whether the command is too old; then the part holds."""
+        """Return whether the command is too old; then the part is put in hold."""
         age, ttl, late = k - current.order.re_k, float(current.order.ttl), (now - current.expires) / 1e6
         if self._ttl_ticks is not None:
             if age > self._ttl_ticks:

@@ -26,7 +26,7 @@ class Guard:
     """The gates of all parts, one for each, and the emergency stop of all parts."""
 
     def __init__(self, service: Service, robot: Robot, backend: Backend, dt: float, record: StopRecord | None, speed: float = 1.0) -> None:
-        """Make the gates; an emergency stop that the record holds is in force from the beginning.
+        """Make the gates; an emergency stop in the record is in force from the beginning.
 
         `dt`: the tick, s. `record`: the file that keeps emergency stops; None: a stop ends with this process. `speed`: simulated seconds
         per second of real time.
@@ -93,7 +93,10 @@ class Guard:
         self._waiting.clear()
 
     def hold_dependents(self, who: str) -> None:
-        """Put the parts in hold that the late service `who` owns; if it is the model, the router or the launcher, put all parts in hold."""
+        """Put the parts that the late service `who` owns in hold: they brake and stand still.
+
+        If it is the model, the router or the launcher, all parts are put in hold.
+        """
         if who in INDISPENSABLE:
             self.hold_all(f"{who} is late")
         for gate in self.gates.values():
@@ -101,7 +104,7 @@ class Guard:
                 gate.force_hold(f"its owner {who} is late")
 
     def hold_all(self, why: str) -> None:
-        """Put every armed part in hold at once; `why`: reason, for the event."""
+        """Put every armed part in hold at once: it brakes and stands still. `why`: reason, for the event."""
         for gate in self.gates.values():
             gate.force_hold(why)
 

@@ -76,7 +76,10 @@ class Backend(Protocol):
         ...
 
     def reset(self, seed: int) -> None:
-        """Put the robot at home, at rest, with all motors in hold, and the world in its initial state; `seed`: of the encoder noise."""
+        """Put the robot at home, at rest, with all motors in hold, and the world in its initial state.
+
+        In hold a motor keeps its position and follows no commands. `seed`: of the encoder noise.
+        """
         ...
 
     def place(self, name: str, position: tuple[float, float, float]) -> None:
@@ -107,7 +110,10 @@ class KinematicBackend:
         self.reset(seed)
 
     def reset(self, seed: int) -> None:
-        """Put the robot at home, at rest, with all motors in hold, and the world in its initial state; `seed`: of the encoder noise."""
+        """Put the robot at home, at rest, with all motors in hold, and the world in its initial state.
+
+        In hold a motor keeps its position and follows no commands. `seed`: of the encoder noise.
+        """
         self.motors = Motors(self._robot, self._parameters, seed, self._robot.home)
         self.world = self._load_world()
         self.notes: Sequence[str] = unmoved(self.world)

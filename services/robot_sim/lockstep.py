@@ -45,7 +45,7 @@ class Lockstep:
     def wait(self, k: int) -> None:
         """Wait until tick k is answered, then admit the commands for it, in an order that does not depend on their arrival.
 
-        Parts that depend on a late participant are put in hold.
+        Parts that depend on a late participant are put in hold: they brake and stand still.
         """
         for who in self._barrier.wait(k):
             self._guard.hold_dependents(who)

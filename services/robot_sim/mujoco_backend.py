@@ -25,8 +25,9 @@ Mask = NDArray[np.bool_]
 class MujocoBackend:
     """All joints of any robot with gravity in MuJoCo; the base of the robot is fixed.
 
-    A joint is a velocity constraint whose largest torque is that of the motor, so the servo holds the weight. In torque mode the commanded
-    torque acts through a gear with the inertia and the friction of the control law, and must include the torque that holds the weight.
+    A joint is a velocity constraint whose largest torque is that of the motor, so the servo carries the weight. In torque mode the
+    commanded torque acts through a gear with the inertia and the friction of the control law, and must include the torque that carries the
+    weight.
     """
 
     name = "mujoco"
@@ -46,7 +47,10 @@ class MujocoBackend:
         self.reset(seed)
 
     def reset(self, seed: int) -> None:
-        """Put the robot at home, at rest, with all motors in hold, and the world in its initial state; `seed`: of the encoder noise."""
+        """Put the robot at home, at rest, with all motors in hold, and the world in its initial state.
+
+        In hold a motor keeps its position and follows no commands. `seed`: of the encoder noise.
+        """
         self._world = self._load_world()
         self.motors = Motors(self._robot, self._parameters, seed, self._robot.home)
         self._scene = MujocoScene(self._robot, self._world, self._substep)
@@ -88,7 +92,7 @@ class MujocoBackend:
         self._scene.move(name, position)
 
     def set_posture(self, q: Array) -> None:
-        """Put the motors at q (n,) rad, at rest and in hold."""
+        """Put the motors at q (n,) rad, at rest and in hold (they keep their positions and follow no commands)."""
         self._scene.set_posture(q)
         self.motors.restart(self.motors.seed, q)
 

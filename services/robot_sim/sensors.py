@@ -61,7 +61,10 @@ def part_meta(robot: Robot, part: str) -> PartMeta:
 
 
 class Sensors:
-    """The newest sample of every part, and the streams `tick` and `{part}/state` that publish the samples."""
+    """The newest sample of every part, and the streams `tick` and `{part}/state` that publish the samples.
+
+    A sample has the encoder positions, velocities and torques of the part's motors at one time.
+    """
 
     def __init__(self, bus: Bus, robot: Robot, dt: float) -> None:
         self._bus, self._dt = bus, dt
@@ -74,7 +77,7 @@ class Sensors:
         self.reset()
 
     def reset(self) -> None:
-        """Drop all samples and the hash; call this at the start of a new run."""
+        """Drop all samples (readings of the parts' motors) and the hash; call this at the start of a new run."""
         self._hash = hashlib.sha256()
         self._statuses: dict[str, PartStatus] = {}
 
@@ -90,8 +93,8 @@ class Sensors:
     def sample(self, shares: Sequence[tuple[float, str]], motors: Motors, gates: Mapping[str, Gate]) -> None:
         """Read parts at their times in this tick, by interpolation between its start (`begin`) and its end, with encoder noise.
 
-        `shares`: pairs of the share of the tick (0 to 1) and the part. Velocities are those of the motors. Each sample is published on
-        `{part}/state`.
+        `shares`: pairs of the share of the tick (0 to 1) and the part. Velocities are those of the motors. The readings of each part, a
+        sample, are published on `{part}/state`.
         """
         q, dq, tau = motors.q, motors.motor_velocities, motors.efforts
         noise = motors.encoders(self._bus.k, self._dt) - q
@@ -113,7 +116,7 @@ class Sensors:
             self._report(part, self._bus.t + round(share * self._dt * 1e9), gates[part])
 
     def sample_now(self, motors: Motors, gates: Mapping[str, Gate]) -> None:
-        """Read all parts as they are now, at the beginning of the tick, and publish the samples on `{part}/state`.
+        """Read all parts as they are now, at the beginning of the tick, and publish the readings on `{part}/state`.
 
         Tick 0, in which nothing moves, is read without noise.
         """
@@ -132,7 +135,7 @@ class Sensors:
             self._tick.put(dt=dt, mode=mode, rate=rate, q=self._q.tolist(), parts=self._statuses)
 
     def digest(self) -> None:
-        """Add the samples of this tick to the SHA-256 of the run, `hash`."""
+        """Add the samples (readings of the parts' motors) of this tick to the SHA-256 of the run, `hash`."""
         for part, status in self._statuses.items():
             where = self._where[part]
             self._hash.update(self._q[where].tobytes() + self._dq[where].tobytes() + f"{status.mode} {status.gate}".encode())

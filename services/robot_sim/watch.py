@@ -29,7 +29,10 @@ REST_SPEED = np.deg2rad(1.0)  # rad/s; a part whose motors are slower is at rest
 
 @dataclass(slots=True)
 class Stops:
-    """Statistics of how parts come to rest in hold: the stops in progress, and the largest time and distance of ended stops."""
+    """Statistics of how parts come to rest in hold: the stops in progress, and the largest time and distance of ended stops.
+
+    A part in hold brakes and stands still.
+    """
 
     count: int = 0
     time_max: float = 0.0  # s
@@ -53,8 +56,8 @@ class Stops:
     def note_hold(self, part: str, now: int, q: Array, moves: bool) -> tuple[float, float] | None:
         """Record that the part is in hold; if it has just come to rest, return time [s] and distance [rad] since its last command.
 
-        Otherwise return None. `now`: time, ns. `q`: measured positions of the part's motors, (n_part,) rad. `moves`: whether the part still
-        moves. The distance is the largest one of the part's motors.
+        Otherwise return None. In hold the part brakes and stands still. `now`: time, ns. `q`: measured positions of the part's motors,
+        (n_part,) rad. `moves`: whether the part still moves. The distance is the largest one of the part's motors.
         """
         if moves or part not in self._commanded:
             return None
@@ -86,7 +89,10 @@ class Counters:
         self.tick_time = Percentiles()  # ms, gate to end of physics
 
     def count_gates(self, gates: Iterable[Gate]) -> None:
-        """Count the tick, the age of its oldest command, and whether all owned parts follow commands or one holds; once per tick."""
+        """Count the tick, the age of its oldest command, and whether all owned parts follow commands or one is in hold.
+
+        A part in hold brakes and stands still. Call this once per tick.
+        """
         self.ticks += 1
         owned = [gate for gate in gates if gate.state != "idle"]
         ages = [gate.age for gate in owned if gate.mode != "hold"]  # a commanded hold counts as a hold

@@ -144,7 +144,7 @@ class VisionNode:
         return not any(self._trouble.values())
 
     def _turned(self, eyes: Eyes) -> float:
-        """Return the angle [rad] by which the gaze has turned since the last look."""
+        """Return the angle [rad] by which the gaze has turned since the last look (pair of pictures)."""
         gaze, before = eyes.eyes[0].rotation, self._gaze
         self._gaze = gaze
         return 0.0 if before is None else float(np.arccos(np.clip(0.5 * (np.trace(before.T @ gaze) - 1.0), -1.0, 1.0)))

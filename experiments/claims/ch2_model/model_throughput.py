@@ -175,7 +175,7 @@ class _Timer:
 
 
 def read_flood(path: Path) -> list[Record]:
-    """Read the records of a run from its file; returns an empty list if there is no file."""
+    """Read the records of a run from its file, a record for each measurement, in order; returns an empty list if there is no file."""
     types: dict[str, Any] = {"robot": str, "seconds": float}
     return [cast(Record, {name: types.get(name, int)(text) for name, text in row.items()}) for row in read_records(path, COLUMNS)]
 

@@ -54,9 +54,9 @@ MIN_SECONDS = 60.0  # s, shortest time for a slope
 class Editor:
     """Edits a world at random from one thread: objects of its own, and objects that all threads share.
 
-    It knows the state of its own objects, so none of these edits may be refused.  `edits`: number of edits.  `refused`: number of refused
-    edits of shared objects, which are allowed.  Two of its objects are witnesses of the order of edits: the editor always moves the first
-    one by a step, then the second.
+    It knows the state of its own objects, so none of the edits of these may be refused.  `edits`: number of edits.  `refused`: number of
+    refused edits of shared objects, which are allowed.  Two of its objects are witnesses of the order of edits: the editor always moves the
+    first one by a step, then the second.
 
     Args:
         world, robot: the world to edit, and the robot to whose links objects are attached.
@@ -181,7 +181,7 @@ class WatchedWorld(World):
 
 
 def torn_table(snapshot: Snapshot) -> str | None:
-    """Return a text that says how the tables of a snapshot differ from its objects; None if they agree exactly.
+    """Return a text that says how the tables of a snapshot differ from its objects (they are torn); None if they agree exactly.
 
     A snapshot is an unchanging copy of the world.  The compared tables are the names, the roles, the names of attached objects, and the
     numbers that describe the volumes.  All objects must be boxes.
@@ -262,10 +262,10 @@ def resident_mb() -> float | None:
 
 
 def slope_mb_per_minute(seconds: Sequence[float], megabytes: Sequence[float]) -> float | None:
-    """Fit a line to the samples of the memory and return its slope [MB/min].
+    """Fit a line to measurements of the memory over time and return its slope [MB/min].
 
-    `seconds`: times of the samples since the start.  `megabytes`: the memory.  The first 20 % of the time (WARM_UP) is left out.  Returns
-    None if the remaining samples cover less than MIN_SECONDS (60 s).
+    `seconds`: times of the measurements since the start.  `megabytes`: the memory.  The first 20 % of the time (WARM_UP) is left out.
+    Returns None if the remaining measurements cover less than MIN_SECONDS (60 s).
     """
     settled = [(t / 60.0, mb) for t, mb in zip(seconds, megabytes, strict=True) if t > WARM_UP * seconds[-1]]
     if not settled or (settled[-1][0] - settled[0][0]) * 60.0 < MIN_SECONDS:
@@ -289,7 +289,10 @@ class Judge:
         self._evaluations = self._version = 0
 
     def check(self, pose: Pose) -> None:
-        """Check an evaluation and count its errors in `torn`.  Every 50th (REFERENCE_PERIOD) is also compared with a reference model."""
+        """Check an evaluation and count its errors in `torn`, a dict from the text of an error to how often it occurred.
+
+        Every 50th evaluation (REFERENCE_PERIOD) is also compared with a reference model.
+        """
         snapshot = self._world.seen
         self._evaluations += 1
         found = [torn_table(snapshot), other_objects(pose, snapshot), out_of_order(snapshot.objects, self._threads)]
@@ -354,10 +357,13 @@ class Endurance:
     def verdict(self) -> dict[str, Any]:
         """Return the counts and results of the run.
 
-        "passed": whether the checks found no error, no exception was raised, and the memory grew by less than MAX_SLOPE (0.5 MB/min).
-        "torn" and "exceptions": dicts from the text of an error to how often it occurred.  "slope_mb_per_minute": growth of the memory,
-        None if the run was too short; then it is not judged.  The other keys are numbers of threads, evaluations and edits, and the first
-        and last memory.
+        "passed": whether there was an evaluation, the checks found no error, no exception was raised, and the memory grew by less than
+        MAX_SLOPE (0.5 MB/min).  "torn": dict from the text of an error that the checks found in an evaluation (it does not fit one
+        consistent state of the world) to how often it occurred.  "exceptions": the same, for tracebacks.  "slope_mb_per_minute": growth of
+        the memory; None if the run was too short, then it is not judged.  "threads", "evaluations" and "edits": numbers.
+        "compared_with_a_world_built_anew": number of evaluations that were compared with a second model.  "refused_as_they_must_be": number
+        of refused edits of objects that the threads share.  "resident_mb": dict of the "first" and "last" memory [MB]; None if it is not
+        known.
         """
         slope = slope_mb_per_minute(*zip(*self.samples, strict=True)) if self.samples else None
         is_sound = not self.judge.torn and not self.exceptions and self.moving.evaluations > 0
@@ -386,8 +392,9 @@ class Endurance:
 def endure(folder: Path, *, threads: int, duration: float, seed: int) -> dict[str, Any]:
     """Run the endurance test with `threads` editing threads for `duration` s, and return its counts and results.
 
-    Keys: "seconds", the duration, and those of `Endurance.verdict`, among them "passed".  A row per second is written to endurance.csv in
-    `folder`, which is deleted first if it exists.  `seed`: of the boxes, the edits and the motion.
+    Keys: "seconds", the duration, and those of `Endurance.verdict`, among them "passed".  The run ends early if the model raises an
+    exception.  A row per second is written to endurance.csv in `folder`, which is deleted first if it exists.  `seed`: of the boxes, the
+    edits and the motion.
     """
     path = folder / ENDURANCE
     path.unlink(missing_ok=True)  # an interrupted endurance run starts again

@@ -86,7 +86,8 @@ def are_complete(runs: Runs) -> bool:
 def findings(found: Cells) -> dict[str, Any]:
     """Return the results of the sweep.
 
-    Keys: "evaluations", by task and strategy, as text; "found", the share of successful runs, by strategy; "claims", the judged claims.
+    Keys: "evaluations", a dict from "function, dimensions" to a dict from the strategy to the evaluations, as text; "found", a dict from
+    the strategy to the share of successful runs; "claims", a list with the judged claims, as dicts (`Claim.record`).
     """
     runs = evaluations(found)
     return {

@@ -104,7 +104,8 @@ def solvers(found: Cells) -> Solvers:
 def findings(found: Cells) -> dict[str, Any]:
     """Return the results of the sweep.
 
-    Keys: "solvers", a line of text for each solver and number of motors; "claims", the judged claims.
+    Keys: "solvers", a dict from "solver, number of motors" to a line of text with the share of reached targets, evaluations and time;
+    "claims", a list with the judged claims, as dicts (`Claim.record`).
     """
     known = solvers(found)
     rows = {f"{name}, {motors} motors": str(solver) for (name, motors), solver in sorted(known.items())}

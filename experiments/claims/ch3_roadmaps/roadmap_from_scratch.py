@@ -276,8 +276,9 @@ def unreached(values: Mapping[str, Any]) -> int:
 def findings(found: Cells, live: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """Return the results of all cells (explorations, one for each seed) and of the live exploration.
 
-    Keys: "maps", a row for each map: minutes of robot time, numbers of edges, repairs and unreached samples, deepest solid contact;
-    "claims", the judged claims.  `live`: the result of `read_live`; None: not explored live.
+    Keys: "maps", a dict from "seed N" or "live" to a row of the map: minutes of robot time, numbers of edges, repairs and unreached samples
+    (poses of vertices), deepest solid contact, and others; "claims", a list with the judged claims, as dicts (`Claim.record`).  `live`: the
+    result of `read_live`; None: not explored live.
     """
     results = sorted(found.values(), key=lambda result: result.cell.seed)
     rows = {f"seed {result.cell.seed}": _row(result.values) for result in results}
@@ -422,9 +423,9 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 def results(folder: Path) -> dict[str, Any]:
-    """Return the rows of all maps and the judged claims, from the finished cells in `folder` and its live exploration if there is one.
+    """Compute the results from the finished cells in `folder` and its live exploration if there is one, as `findings` returns them.
 
-    The keys are those of `findings`.
+    Keys: "maps", a dict from the name of a map to a row of numbers; "claims", a list with the judged claims, as dicts (`Claim.record`).
     """
     return findings(load_cells(folder), read_live(folder / "live"))
 

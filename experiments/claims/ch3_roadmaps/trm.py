@@ -213,9 +213,9 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 def results(folder: Path) -> dict[str, Any]:
-    """Return the measures of all maps and the judged claims, computed from the file of measures in `folder`.
+    """Compute the results of all maps from the file of measures in `folder`, as `findings` returns them.
 
-    The keys are those of `findings`.
+    Keys: "maps", the measures of the maps, as text; "claims", a list with the judged claims, as dicts (`Claim.record`).
     """
     measures = json.loads((folder / MEASURES).read_text())
     return findings(
@@ -263,9 +263,10 @@ def rebuilt(example: Example, values: Mapping[str, Any]) -> Roadmap:
 
 
 def findings(runs: Runs) -> dict[str, Any]:
-    """Return the results.
+    """Return the results of all maps.
 
-    Keys: "maps", the estimates of all measures as text, by task and method; "claims", the judged claims.
+    Keys: "maps", a dict from the task to a dict from the method to a dict from the measure to its estimate, as text; "claims", a list with
+    the judged claims, as dicts (`Claim.record`).
     """
     table: dict[str, dict[str, dict[str, str]]] = {}
     for (task, method), columns in runs.items():

@@ -38,7 +38,7 @@ COLUMNS = 4
 def draw_cloud(example: Example, roadmap: Roadmap, path: Path, height: int = 400) -> Path:
     """Draw the marker positions of all poses of a roadmap, and the robot in one pose, to `path`; returns `path`.
 
-    `height`: of the picture, pixels.
+    `height`: height of the picture, pixels.
     """
     shown = roadmap.q[_near(roadmap, example.via[0])]
     return marker_cloud(example.model, roadmap.q, example.markers, path, shown, title=_title(example), height=height)
@@ -53,12 +53,18 @@ def cloud_panel(example: Example, roadmap: Roadmap, height: int) -> Panel:
 
 
 def draw_film(example: Example, roadmap: Roadmap, path: Path, height: int = 260) -> Path:
-    """Draw a filmstrip of the example's motion to `path`; returns `path`.  `height`: of a picture, pixels."""
+    """Draw a filmstrip of the example's motion to `path`; returns `path`.
+
+    The motion follows the shortest path in `roadmap` through the example's task points.  `height`: height of each picture, pixels.
+    """
     return filmstrip([strip_of(example, roadmap)], path, height)
 
 
 def strip_of(example: Example, roadmap: Roadmap, poses: int = POSES) -> Strip:
-    """Return the example's motion as a row of a filmstrip with `poses` pictures and the task coordinates below each."""
+    """Return the example's motion as a row of a filmstrip with `poses` pictures and the task coordinates below each.
+
+    The motion follows the shortest path in `roadmap` through the example's task points.
+    """
 
     def caption(motion: Motion, moment: int) -> str:
         y = example.task.of(example.model.evaluate(motion.poses[moment].q[None]))[0]
@@ -106,7 +112,10 @@ def _moving_parts(example: Example) -> tuple[str, ...]:
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Build and draw the maps that the command line names."""
+    """Build and draw the maps of the tasks on the command line; a map file that exists already in the folder is read instead.
+
+    `argv`: command-line arguments; None: those of the process.  Raises SystemExit with the text of an error of the library.
+    """
     parser = argparse.ArgumentParser(description="Build the maps of tasks and draw them.")
     parser.add_argument("tasks", nargs="+", choices=[*EXAMPLES, "all"], metavar="TASK", help=f"all, or of {', '.join(EXAMPLES)}")
     parser.add_argument("--method", choices=METHODS, default=METHODS[0], help="how poses are found (default: %(default)s)")

@@ -125,7 +125,10 @@ def trial_lengths(minutes: float, trial: float) -> list[float]:
 
 
 def read_trials(folder: Path, mode: str) -> list[Trial]:
-    """Read the finished trials of a mode from the folder of a run, in order.  `mode`: a key of TITLES ("off", "one" or "two")."""
+    """Read the measurements of each finished trial of a mode from the folder of a run, in the order of the trials.
+
+    `mode`: a key of TITLES ("off", "one" or "two").
+    """
     return [read_trial(path) for path in sorted(folder.glob(f"{mode}/*/{TRIAL}"))]
 
 

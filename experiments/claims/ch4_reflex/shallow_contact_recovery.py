@@ -347,12 +347,12 @@ def _deflect(table: Table, client: Client, body: _Body, truth: Truth) -> bool:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return "passed", whether the claim holds, and for each variant the numbers by angle [degrees, as text], as in `summary`."""
+    """Return "passed", whether the claim holds, and for each variant a dict from the angle [degrees, as text] to the dict of `summary`."""
     return results(_trials(found))
 
 
 def results(trials: Sequence[Trial]) -> dict[str, Any]:
-    """Return "passed", whether the claim holds, and for each variant the numbers by angle [degrees, as text], as in `summary`."""
+    """Return "passed", whether the claim holds, and for each variant a dict from the angle [degrees, as text] to the dict of `summary`."""
     angles = sorted({trial.angle for trial in trials}, reverse=True)
     table: dict[str, Any] = {
         variant: {f"{angle:g}": summary([t for t in trials if (t.variant, t.angle) == (variant, angle)]) for angle in angles}

@@ -135,8 +135,10 @@ CLAIMS = (controllers, reflexes, out_of_step)
 def findings(found: Cells) -> dict[str, Any]:
     """Return the results of the sweep as a dict with the keys "protections" and "claims".
 
-    "protections" has for each protection the number of "collisions" between the robots, "deepest, mm", the depth of the deepest contact
-    between them, "own, mm", that of a robot with itself or the table, and numbers of reflexes.  "claims": the judged claims.
+    "protections": a dict from the protection to a dict with "minutes" of robot time; the number of "collisions" between the robots;
+    "deepest, mm", the depth of the deepest contact between them; "own, mm", that of a robot with itself or the table; the number of
+    "reflexes", and of those that got "stuck"; "rad a minute", the path of the motors.  "claims": a list with the judged claims, as dicts
+    (`Claim.record`).
     """
     groups = grouped(found, "condition", tuple(PROTECTIONS))
     rows = {

@@ -84,8 +84,9 @@ def _reasons(runs: Runs) -> dict[str, int]:
 def findings(found: Cells) -> dict[str, Any]:
     """Return the results of the sweep.
 
-    Keys: "planners", the numbers of each planner; "ended", how often each reason ended a trial early; "claims", the judged claims.
-    "planning, ms" is the processor time of all plans of a trial, median.
+    Keys: "planners", a dict from the planner to its numbers; "ended", a dict from the planner to a dict from the reason for which trials
+    ended early to their number; "claims", a list with the judged claims, as dicts (`Claim.record`).  Among the numbers, "planning, ms" is
+    the processor time of all plans of a trial, median; "distance, mm" and "angle, deg" are None if no trial came to the pre-grasp.
     """
     rows: dict[str, Any] = {}
     reasons: dict[str, Any] = {}

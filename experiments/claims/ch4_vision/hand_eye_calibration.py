@@ -222,7 +222,11 @@ CLAIMS = (accuracy, honest)
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the results of the sweep.  Keys: "runs", the numbers of each robot; "claims", the judged claims."""
+    """Return the results of the sweep.
+
+    Keys: "runs", a dict from each finished cell (one simulated robot) to its numbers, such as "before, median mm" and "after, median mm",
+    the errors of places before and after the calibration; "claims", a list with the judged claims, as dicts (`Claim.record`).
+    """
     groups = grouped(found, "calibration", ("hand",))
     band = chi_squared(0.95, 3)
     rows = {

@@ -272,7 +272,11 @@ CLAIMS = (accuracy, honest, nothing_false)
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the results of the sweep.  Keys: "runs", the numbers of each robot; "claims", judged only for the detector by colour."""
+    """Return the results of the sweep.
+
+    Keys: "runs", a dict from each finished cell (one simulated robot) to its numbers, such as "found, share" and the errors in mm of each
+    kind of object; "claims", a list with the judged claims, as dicts (`Claim.record`), which are judged only for the detector by colour.
+    """
     groups = grouped({name: cell for name, cell in found.items() if "detector" not in cell.cell.settings}, "world", ("things",))
     return {"runs": {name: _row(cell.values) for name, cell in found.items()}, "claims": judged(CLAIMS, groups, bool(groups))}
 

@@ -207,8 +207,8 @@ def dead_time(hand: Array, dt: float) -> float:
 def findings(found: Cells) -> dict[str, Any]:
     """Return the largest measurements as a dict from the gain set to a dict from the wall, or "drawn: " and the target, to numbers by name.
 
-    The names are those of `press` and `draw_hand`.  "passed": whether with the default gains solids are at most 2 mm deep, constraints
-    violated by at most 2 degrees, oscillations at most 1 mm, and times without motion at most 0.3 s; None if they were not run.
+    The names are keys of the dicts of `press` and `draw_hand`.  "passed": whether with the default gains solids are at most 2 mm deep,
+    constraints violated by at most 2 degrees, oscillations at most 1 mm, and times without motion at most 0.3 s; None if they were not run.
     """
     pressed, drawn = _grouped(found)
     table: dict[str, Any] = {gains: {} for gains in GAINS}

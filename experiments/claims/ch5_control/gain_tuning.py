@@ -262,7 +262,7 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 def read_tried(path: Path) -> list[Tried]:
-    """Read the gain sets that a run has judged so far from its file."""
+    """Read the gain sets that a run has judged so far from its file, each with its criteria, in the order of the search."""
     return [Tried.of_record(row) for row in read_records(path, COLUMNS)]
 
 
@@ -337,9 +337,9 @@ def _changed(numbers: dict[str, float], step: float, rng: np.random.Generator) -
 def results(tried: list[Tried]) -> dict[str, Any]:
     """Return the default and the best gain set side by side.
 
-    "objective": values of the default and of the best gain set.  "criteria" and "gains": dicts from a name to two values, of the default
-    and of the best.  "judged": number of gain sets.  "passed": whether no set is clearly better, that is, has less than 0.8 of the
-    default's objective.
+    "objective": a list of two values, of the default and of the best gain set.  "criteria" and "gains": dicts from a name to a list of two
+    values, of the default and of the best.  "judged": number of gain sets.  "passed": whether no set is clearly better, that is, has less
+    than 0.8 of the default's objective.
     """
     before, best = tried[0], min(tried, key=lambda one: one.objective)
     criteria = {name: [round(value, 4), round(asdict(best.judged)[name], 4)] for name, value in asdict(before.judged).items()}

@@ -51,14 +51,16 @@ PANELS = (("moved_mm", "the hand moved [mm]"), ("solid_mm", "deepest solid [mm]"
 
 
 class ExternalPush:
-    """An external force at the left hand that moves the joints of a plant, called before every tick.
+    """A constant external force at the left hand that moves the joints of a plant; call it with the tick number before each tick.
 
-    The joints move by inertia dv/dt = J^T f - friction v, as motors yield in the torque modality.
+    In addition to its commanded motion, each motor moves by I dv/dt = tau - b v: tau = J^T f is the torque of the force [N m], v the
+    velocity [rad/s], I the inertia INERTIA (0.5 kg m^2), b the friction FRICTION (5 N m s/rad).  The values are those of motors to which
+    the controller sends torques.  Positions are clipped to the limits.
 
     Args:
         plant: the plant.
         force: (3,) N, root frame.
-        start, end: times between which the force acts [s].
+        start, end: times of the plant [s] between which the force acts.
     """
 
     def __init__(self, plant: OfflinePlant, force: Array, start: float, end: float) -> None:
@@ -67,7 +69,7 @@ class ExternalPush:
         self._velocity = np.zeros(len(plant.robot.motors))
 
     def __call__(self, tick: int) -> None:
-        """Move the joints by the external force, before the tick of this number."""
+        """Move the joints by the external force for one tick; `tick`: number of the tick that begins."""
         plant = self._plant
         torque = plant.model.jacobian(plant.motors.q, MARKER)[:3].T @ self._force if tick in self._ticks else 0.0
         # The exact solution over one tick: at 20 ms the friction is stiff.
@@ -97,7 +99,8 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 def push_hand(law: str, direction: str, force: float, seed: int) -> dict[str, Any]:
     """Command home while an external force pushes the left hand, and return the worst measurements.
 
-    `law`: name of the gain set, or "off": the commanded velocity is always 0.  `direction`: a key of DIRECTIONS.  `force`: N.
+    `law`: name of the gain set, or "off": the commanded velocity is always 0.  `direction`: a key of DIRECTIONS.  `force`: N.  `seed`: of
+    the plant.
 
     Keys: "moved_mm" and "away_mm", largest and last distance of the hand from its start; "solid_mm" and "beside_mm", depths of contacts of
     solids, of the pairs of shapes that the simulator tests too, and of all others; "pair", the deepest of the tested pairs; "field_mm",
@@ -132,12 +135,12 @@ def push_hand(law: str, direction: str, force: float, seed: int) -> dict[str, An
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the results by law and direction: the smallest forces [N] with an event, and the deepest contact and last distance [mm].
+    """Return the results as a dict from the law to a dict from the direction to numbers by name, and "passed".
 
-    The events are contact of solids, violation of a constraint, and impact of a motor at its hard stop; the force is None if the event did
-    not occur.  The last distance of the hand from its start is the largest one after forces of at most 5 N.  "passed": whether with the
-    default gains forces of at most 5 N cause no contact of solids and no violation, and the hand returns to within 5 mm; None if they were
-    not run.
+    "solids_touch_from_N", "constraint_violated_from_N" and "motor_into_its_stop_from_N": smallest force [N] with this event; None if it did
+    not occur.  "deepest_solid_mm": depth of the deepest contact.  "back_within_mm": the last distance of the hand from its start, the
+    largest one after forces of at most 5 N.  "passed": whether with the default gains forces of at most 5 N cause no contact of solids and
+    no violation, and the hand returns to within 5 mm; None if they were not run.
     """
     pushes = _pushes(found)
     table = {law: {direction: _summary(mine) for (of, direction), mine in pushes.items() if of == law} for law in LAWS}

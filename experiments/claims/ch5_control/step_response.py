@@ -107,10 +107,11 @@ def _posture(number: int, seed: int) -> Array:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the median and the worst value of each measurement, by gain set, control period, and motors or postures.
+    """Return the results as a dict from the gain set to a dict from the control period and "motors" or "postures" to numbers, and "passed".
 
-    "passed": whether all steps with the default gains settle, with at most 5 % overshoot, within 3 s (single motor) or 6 s (posture); None
-    if they were not run.
+    The numbers are "steps" and "never_settled", and for "settling_time_s", "overshoot", "error_deg" and "rest_deg" a list of the median and
+    the worst value.  "each" says this.  "passed": whether all steps with the default gains settle, with at most 5 % overshoot, within 3 s
+    (single motor) or 6 s (posture); None if they were not run.
     """
     responses = _responses(found)
     table: dict[str, Any] = {}

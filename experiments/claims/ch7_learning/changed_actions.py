@@ -111,8 +111,9 @@ def left(run: dict[str, Any], after: int = JUDGED_AFTER) -> float:
 def findings(found: Cells) -> dict[str, Any]:
     """Return the results as a dict with two keys, "agents" and "claims".
 
-    "agents" has a row of numbers for each agent, "claims" the claims with their measured values and verdicts.  If not every agent was run
-    in full, there are no rows, and all claims stay unmeasured and are not judged.
+    "agents" is a dict from each agent to a row of numbers, such as "error left after N" (transitions) and "relative tries of changed
+    actions"; "claims" is a list with the claims, their measured values and their verdicts, as dicts (`Claim.record`).  If not every agent
+    was run in full, there are no rows, and all claims stay unmeasured and are not judged.
     """
     runs = grouped_by(found, "agent", "changed")
     whole = len(runs) == 2 * len(AGENTS) and len(runs[OURS, True][0]["errors"]) == AFTER // CHECK_PERIOD + 1

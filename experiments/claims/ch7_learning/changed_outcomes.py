@@ -271,8 +271,9 @@ COLUMNS: dict[str, Number] = {
 def findings(found: Cells) -> dict[str, Any]:
     """Return the results as a dict with two keys, "agents" and "claims".
 
-    "agents" has a row of numbers for each change and agent, "claims" the claims with their measured values and verdicts.  If not every
-    agent was run in full with both changes, all claims stay unmeasured and are not judged.
+    "agents" is a dict from "change; agent" to a row: the number of runs ("seeds"), and means of the numbers in COLUMNS.  "claims" is a list
+    with the claims, their measured values and their verdicts, as dicts (`Claim.record`).  If not every agent was run in full with both
+    changes, all claims stay unmeasured and are not judged.
     """
     runs = runs_of(found)
     keys = [(change, *agent) for change, agent in product(CHANGES, AGENTS)]

@@ -146,9 +146,9 @@ def pushed(runs: Runs) -> dict[str, list[float]]:
 def findings(found: Cells) -> dict[str, Any]:
     """Return the results as a dict with two keys, "agents" and "claims".
 
-    "agents" has a row of numbers for each arrangement (postures of the hand and cells on the table) and agent, "claims" the claims with
-    their measured values and verdicts.  If not every agent was run in full in the first arrangement, all claims stay unmeasured and are not
-    judged.
+    "agents" is a dict from "arrangement: agent" to a row: "seeds", and means of the numbers in ROW; an arrangement is a number of postures
+    of the hand and of cells on the table.  "claims" is a list with the claims, their measured values and their verdicts, as dicts
+    (`Claim.record`).  If not every agent was run in full in the first arrangement, all claims stay unmeasured and are not judged.
     """
     groups = grouped_by(found, "arrangement", "agent")
     runs = {agent: groups[MAIN, agent] for agent in AGENTS if (MAIN, agent) in groups}

@@ -155,7 +155,7 @@ def _distances(from_state: Ints, to_state: Ints, states: int) -> Array:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the results: "runs" has a row for each graph, world and agent; "claims" has the judged claims.
+    """Return the results: "runs" is a dict from "graph world agent" to the dict of `row`, "claims" a list with the judged claims, as dicts.
 
     The claims are about the published graph, "nearest", and are absent if it was not run.
     """

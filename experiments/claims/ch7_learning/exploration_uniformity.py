@@ -158,8 +158,9 @@ COLUMNS: dict[str, Callable[[Explored], float]] = {
 def findings(found: Cells) -> dict[str, Any]:
     """Return the results as a dict with two keys, "runs" and "claims".
 
-    "runs" has a row of numbers for each graph and explorer, "claims" the claims with their measured values and verdicts.  If not every
-    explorer was run on every graph, all claims stay unmeasured and are not judged.
+    "runs" is a dict from "graph, explorer" to a row of numbers, such as "seeds", "relative_spread_of_tries", "fewest_tries" and
+    "most_tries" of a state-action.  "claims" is a list with the claims, their measured values and their verdicts, as dicts
+    (`Claim.record`).  If not every explorer was run on every graph, all claims stay unmeasured and are not judged.
     """
     grouped, rows = groups(found), {}
     for (graph, explorer), runs in grouped.items():

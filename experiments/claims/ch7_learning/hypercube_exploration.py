@@ -188,7 +188,12 @@ def by_prior(found: Cells) -> Priors:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the results: "runs" has a row for each initialisation and discount, "claims" the judged claims."""
+    """Return the results as a dict with two keys, "runs" and "claims".
+
+    "runs" is a dict from "initialisation, discount" to a row of numbers: "seeds", "actions_until_all_tried_5_times" with its interval "low"
+    to "high", and others about tries and values.  "claims" is a list with the claims, their measured values and their verdicts, as dicts
+    (`Claim.record`).
+    """
     priors = by_prior(found)
     return {
         "runs": {f"{i}, discount {d:g}": _row(d, runs) for i, groups in priors.items() for d, runs in groups.items()},

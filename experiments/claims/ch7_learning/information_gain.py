@@ -151,8 +151,9 @@ def groups(found: Cells) -> Groups:
 def findings(found: Cells) -> dict[str, Any]:
     """Return the results as a dict with two keys, "runs" and "claims".
 
-    "runs" has a row of numbers for each part and divergence, "claims" the claims with their measured values and verdicts.  If not every
-    part was run with every divergence, all claims stay unmeasured and are not judged.
+    "runs" is a dict from "part, divergence" to a row: "seeds", rewards before any try and in the first and last 100 actions, and the number
+    of "untried_actions".  "claims" is a list with the claims, their measured values and their verdicts, as dicts (`Claim.record`).  If not
+    every part was run with every divergence, all claims stay unmeasured and are not judged.
     """
     grouped = groups(found)
     rows = {

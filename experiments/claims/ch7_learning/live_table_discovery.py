@@ -199,8 +199,10 @@ NUMBERS: dict[str, Callable[[Run], float]] = {"touch": lambda run: run.touch, "l
 def results(folder: Path) -> dict[str, Any]:
     """Compute the results from the finished cells (runs of one robot and seed) in the folder.
 
-    Keys: "transitions" of each agent; "runs", rows by robot; "at the table", rows by robot and part: how its actions ended there; "claims",
-    the judged claims.  Raises InvalidValue if fewer than two offline seeds are finished.
+    Keys: "transitions", number of transitions of each agent in a run; "runs", a dict from the robot to a row with the number of runs, the
+    distance of the learned transition models from those of the offline seeds, and measures at the table; "at the table", a dict from
+    "robot, part" to a dict that counts the part's actions by how they ended there; "claims", a list with the judged claims, as dicts
+    (`Claim.record`).  Raises InvalidValue if fewer than two offline seeds are finished.
     """
     runs = runs_in(folder)
     apart = distances(runs)

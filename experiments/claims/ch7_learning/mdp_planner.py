@@ -174,7 +174,8 @@ def entering(runs: Runs, forgetting: float) -> tuple[list[int], dict[str, Array]
 def findings(found: Cells) -> dict[str, Any]:
     """Return the results as a dict with the keys "claims", "plans executed" and "after the table entered".
 
-    "claims" has the judged claims, the others are tables of measures, as in `tables`.
+    "claims" is a list with the judged claims, as dicts (`Claim.record`); the others are lists of rows, each a dict of measures as text, as
+    in `tables`.
     """
     runs = runs_of(found)
     return {"claims": judged(CLAIMS, runs), **tables(runs)}

@@ -168,7 +168,12 @@ def error_curve(world: str, truth: OutcomeModel, seen: Ints) -> Array:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the results: "runs" has a row for each world and explorer after all transitions, "claims" the judged claims."""
+    """Return the results as a dict with two keys, "runs" and "claims".
+
+    "runs" is a dict from "world; explorer" to a row after all transitions: "seeds", the number of "stochastic_actions", the errors in
+    COLUMNS, and the error of the estimated truth.  "claims" is a list with the claims, their measured values and their verdicts, as dicts
+    (`Claim.record`).
+    """
     known = truths(found)
     last = {key: curves[:, -1] for key, curves in errors(found, known).items()}
     floors = {world: truth_error(truth) for world, truth in known.items()}

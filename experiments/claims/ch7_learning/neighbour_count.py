@@ -162,8 +162,9 @@ def learning_times(runs: list[Run]) -> list[int]:
 def findings(found: Cells) -> dict[str, Any]:
     """Return the results as a dict with two keys, "runs" and "claims".
 
-    "runs" has a row of numbers for each graph, "claims" the claims with their measured values and verdicts.  If not all graphs were run,
-    all claims stay unmeasured and are not judged.
+    "runs" is a dict from each graph to a row: "seeds", "state_actions", "transitions_until_all_tried", the shares of tasks solved after
+    numbers of transitions, and "actions_per_solved_task".  "claims" is a list with the claims, their measured values and their verdicts, as
+    dicts (`Claim.record`).  If not all graphs were run, all claims stay unmeasured and are not judged.
     """
     grouped = groups(found)
     rows = {f"{graph} neighbours": _row(runs) for graph, runs in grouped.items()}

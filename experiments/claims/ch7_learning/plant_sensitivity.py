@@ -265,8 +265,9 @@ def _share(space: Lattice, runs: Sequence[Ints], ends: Mapping[tuple[int, int], 
 def findings(found: Cells) -> dict[str, Any]:
     """Return the results as a dict with two keys, "variants" and "claims".
 
-    "variants" has a row for each variant of the plant, as in `Row.record`, "claims" the claims with their measured values and verdicts.  If
-    not all variants were run in full, all claims stay unmeasured and are not judged.
+    "variants" is a dict from each variant of the plant to the dict of `Row.record`.  "claims" is a list with the claims, their measured
+    values and their verdicts, as dicts (`Claim.record`).  If not all variants were run in full, all claims stay unmeasured and are not
+    judged.
     """
     rows = rows_of(found)
     whole = set(rows) == set(VARIANTS) and all(len(result.values["rank4"]) == ACTIONS["rank4"] for result in found.values())

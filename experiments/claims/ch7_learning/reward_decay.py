@@ -95,8 +95,9 @@ CLAIMS = (uniform, collected, faster)
 def findings(found: Cells) -> dict[str, Any]:
     """Return the results as a dict with two keys, "runs" and "claims".
 
-    "runs" has two rows for each explorer (mean and largest reward), "claims" the claims with their measured values and verdicts.  If not
-    every explorer was run, all claims stay unmeasured and are not judged.
+    "runs" is a dict with two rows for each explorer, of the mean and of the largest reward: "seeds", and "after_N_transitions", the reward.
+    "claims" is a list with the claims, their measured values and their verdicts, as dicts (`Claim.record`).  If not every explorer was run,
+    all claims stay unmeasured and are not judged.
     """
     groups = grouped(found, "explorer", EXPLORERS)
     rows: dict[str, Any] = {}

@@ -82,8 +82,10 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 def results(folder: Path) -> dict[str, Any]:
     """Compute the results from the transitions in the folder as a dict with the keys "claims" and "distances".
 
-    "claims" has the judged claim; "distances" has a row for each task and robot, with the distance of its learned transition model from
-    those of the offline plant.  With runs at the table, further keys say how the actions of each part ended there.
+    "claims" is a list with the judged claim, as a dict (`Claim.record`).  "distances" is a dict from "task, robot" to a row: "total
+    variation" and "share with the same most frequent outcome", which compare the learned transition models with those of the offline plant,
+    and the number of "state-actions compared".  With runs at the table there is "at the table", too: a dict from "robot, part" to a dict
+    that counts the part's actions by how they ended there.
     """
     tasks = _compared(folder)
     table = {f"{task}, {robot}": row for task, found in tasks.items() for robot, row in _rows(found).items()}

@@ -106,12 +106,13 @@ Number = Callable[[Run], float]
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the results as a dict of tables and the judged claims under "claims".
+    """Return the results as a dict of tables, and a list with the judged claims, as dicts (`Claim.record`), under "claims".
 
-    "conditions": a row for each explorer at the table and at its ghost, which exerts no force.  "tries at the table over those at the
-    ghost": how these ratios agree between the arms, and which goals they favour.  "number of actions by number of outcomes": histograms.
-    "precision of finding actions that depend on other parts": the result of `detector`.  If not every explorer was run in full at both, all
-    claims stay unmeasured and are not judged.
+    Each table is a dict.  "conditions": a row for each explorer at the table and at its ghost, which exerts no force: "seeds", and means of
+    the numbers in ROW.  "tries at the table over those at the ghost": correlations of these ratios between the arms, and the share of low
+    goals among the largest ratios.  "number of actions by number of outcomes": for each condition the number of actions of a run, by the
+    number of states in which they ended.  "precision of finding actions that depend on other parts": the result of `detector`.  If not
+    every explorer was run in full at both, all claims stay unmeasured and are not judged.
     """
     forces = runs_of(found)
     tree = forces.get(PROPAGATIONS[0], {})

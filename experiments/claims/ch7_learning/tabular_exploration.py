@@ -220,8 +220,10 @@ def groups(found: Cells, task: str) -> dict[tuple[str, str, float], Runs]:
 def findings(found: Cells) -> dict[str, Any]:
     """Return the results as a dict with the keys "runs" and "mean_share_of_the_best_return".
 
-    "runs" has a row for each task, world and explorer.  "mean_share_of_the_best_return" has for each explorer and value of its parameter
-    its reward as a share of the best policy's reward, as a mean over the worlds.
+    "runs" is a dict from "task, world, explorer" to a row; each measure in it is a list of the interquartile mean and its interval.  For
+    the task "coverage": "once" and "often", the transitions until all was tried, "error", and numbers of runs ("seeds", "finished_once" and
+    "finished_often"); for "return": "share" (the reward as a share of the best policy's reward) and "seeds".
+    "mean_share_of_the_best_return" is a dict from the explorer and the value of its parameter to this share, as a mean over the worlds.
     """
     rows: dict[str, Any] = {}
     for (world, explorer, _), runs in groups(found, "coverage").items():

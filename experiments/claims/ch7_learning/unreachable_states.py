@@ -200,11 +200,12 @@ def runs_of(found: Cells) -> Runs:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the results as a dict of tables by lattice ("small", "stretched"), and the judged claims under "claims".
+    """Return the results as a dict of tables by lattice ("small", "stretched"), and a list with the judged claims under "claims".
 
-    "lattices": a row of numbers.  "states never reached": in which share of the runs.  "end states of deflected actions, times per run": by
-    action of the small lattice.  "self-contacts": the result of `contacts_by_pair`.  If not both lattices were run in full, all claims stay
-    unmeasured and are not judged.
+    "lattices": a row of numbers, such as "states_never_reached" and "share_of_failed_actions".  "states never reached": the states, by the
+    share of the runs in which they were not reached.  "end states of deflected actions, times per run": for actions of the small lattice,
+    the states in which they ended, with their numbers.  "self-contacts": the result of `contacts_by_pair`.  If not both lattices were run
+    in full, all claims stay unmeasured and are not judged.
     """
     runs = runs_of(found)
     whole = all(lattice in runs and len(runs[lattice][0].seen) == actions for lattice, actions in ACTIONS.items())

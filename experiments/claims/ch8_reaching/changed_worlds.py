@@ -400,9 +400,10 @@ def failures(runs: list[dict[str, Any]]) -> Array:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the results: "learners" has a row for each change and learner, "claims" the judged claims.
+    """Return the results: "learners" is a dict from "change; learner" to a row, "claims" a list with the judged claims, as dicts.
 
-    If not every change was run, the claims have no numbers.
+    The numbers of a row: "seeds", scores and failed transitions after numbers of problem-tries (attempts to reach one target), and
+    detections of the change.  If not every change was run, the claims have no numbers.
     """
     runs = runs_of(found)
     rows = {f"{CHANGES[change]}; {learner}": _row(group) for (change, learner), group in runs.items()}

@@ -99,7 +99,10 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the results: "claims" has the judged claims, "cases" a row for each law, scene and method."""
+    """Return the results: "claims" is a list with the judged claims, as dicts, "cases" a list with a row for each law, scene and method.
+
+    The values of a row, a dict, are text: "law", "scene", "method", "success", "reward", "median distance left [cm]", "robot time [s]".
+    """
     groups = grouped(found, "law", LAWS)
     rows = []
     for law, scene, method in product(groups, SCENES, METHODS):

@@ -346,7 +346,11 @@ def row_of(rows: Rows, rival: str, belief: str) -> Row:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the results: "claims" has the judged claims, "rivals" a row for each planner and kind of errors in its model."""
+    """Return the results: "claims" is a list with the judged claims, as dicts, "rivals" a list with rows.
+
+    There is a row, a dict of text, for each planner and kind of errors in its model: "planner", "its model", the numbers in NUMBERS, and
+    "before the first query", the cost of the preparation.
+    """
     rows = rows_of(found)
     table = [
         {"planner": rival, "its model": belief or "none"}

@@ -135,9 +135,10 @@ def summary(values: dict[str, Any]) -> dict[str, Any]:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the results: "runs" has a row for each unit and strategy, "claims" the judged claims.
+    """Return the results: "runs" is a dict from "strategy, unit" to a row, "claims" a list with the judged claims, as dicts.
 
-    Claims about problem-tries that were not made stay open.
+    The values of a row are numbers or text, or dicts from a number of problem-tries (attempts to reach one target) to text, such as
+    "scores".  Claims about problem-tries that were not made stay open; without a unit with all strategies there are no claims.
     """
     units = runs_of(found)
     results: dict[str, Any] = {"runs": {f"{name}, {unit}": _row(group) for unit, runs in units.items() for name, group in runs.items()}}

@@ -168,7 +168,10 @@ def film(file: Path, out: Path, seed: int, poses: int, height: int) -> list[str]
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Draw the filmstrips of the learner in a file; if the file does not exist, a learner is trained and written to it before."""
+    """Draw the filmstrips of the learner in a file; if the file does not exist, a learner is trained and written to it before.
+
+    `argv`: command-line arguments; None: those of the process.  Prints the title of each filmstrip and the path of the picture.
+    """
     parser = argparse.ArgumentParser(description="Draw selected reaches of a learner.")
     parser.add_argument(
         "run",

@@ -154,7 +154,7 @@ def summary(values: dict[str, Any]) -> dict[str, Any]:
 
 
 def results(folder: Path) -> dict[str, Any]:
-    """Compute the results from the finished cells in the folder of a run."""
+    """Compute the results from the finished cells (each with its settings and seed) in the folder of a run, as `findings` returns them."""
     return findings(load_cells(folder))
 
 
@@ -185,7 +185,12 @@ def evaluated_after(found: Found) -> list[int]:
 
 
 def findings(found: Found) -> dict[str, Any]:
-    """Return the results: the oracle's scores, a row for each learner and set of targets, computing times, and the judged claims."""
+    """Return the results of all learners and of the oracle.
+
+    Keys: "oracle's score", a dict from a set of targets to text; "fraction of the oracle's score after so many tries", a dict from
+    "learner, set" to a dict from a number of tries to text; "computing seconds", a dict from the learner to a time [s]; "claims", a list
+    with the judged claims, as dicts (`Claim.record`).
+    """
     curves, at = fractions(found), evaluated_after(found)
     rows = {
         f"{learner}, {_SETS[name]}": {str(checkpoint): estimate(column) for checkpoint, column in zip(at, curve.T, strict=True)}

@@ -327,9 +327,11 @@ def _score(tries: Sequence[PeerTry]) -> Score:
 
 
 def findings(done: Cells) -> dict[str, Any]:
-    """Return the results: the judged claims, a row for each contestant and kind of error, and the crossovers.
+    """Return the results, as lists.
 
-    A crossover is the number of tries from which the learner is no worse than a planner, for each seed.
+    Keys: "claims", a list with the judged claims, as dicts (`Claim.record`); "success", a row for each contestant and kind of error, with
+    shares of success after numbers of tries, ends of the tries, and times; "crossover", a row for each planner and kind of error: the
+    number of tries from which the learner is no worse than the planner, for each seed, as text.
     """
     rows, crossings = [], []
     for wrong in WRONG:

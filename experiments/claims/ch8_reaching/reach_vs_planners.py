@@ -224,7 +224,12 @@ def _followed(both: PeerBelief, path: Array, seed: int) -> float:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the results: the judged claims, a row for each scene and contestant, and the numbers of both arms."""
+    """Return the results of the sweep.
+
+    Keys: "claims", a list with the judged claims, as dicts (`Claim.record`); "cases", a list with a row for each scene and contestant, as
+    text: success, robot time [s], and planning per try [ms]; "both arms", a dict from each measure in ARM_MEASURES but the first to text,
+    or None if it was not measured; and "distance that counts as success [m]".
+    """
     cases, arms = _of(found, "cases"), _of(found, "two arms")
     rows = [
         {

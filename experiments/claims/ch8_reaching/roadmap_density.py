@@ -212,8 +212,10 @@ def _is_free(path: list[int], blocked: frozenset[Edge]) -> bool:
 def findings(found: Cells) -> dict[str, Any]:
     """Return the results as a dict with three keys, "roadmaps", "executed" and "claims".
 
-    "roadmaps" has a row for each spacing and mode of removing edges, "executed" the measures of the executed paths, "claims" the claims
-    with their measured values and verdicts.  With runs of one spacing only, all claims stay unmeasured and are not judged.
+    "roadmaps" is a list with a row for each spacing and mode of removing edges: numbers of vertices, blocked edges and runs, and the
+    measures in ROW.  "executed" is a dict with the number of executed "paths", their solid contacts, and the error of the palm at the end
+    [cm].  "claims" is a list with the claims, their measured values and their verdicts, as dicts (`Claim.record`).  With runs of one
+    spacing only, all claims stay unmeasured and are not judged.
     """
     groups = grouped(found, "spacing", SPACINGS)
     rows = [

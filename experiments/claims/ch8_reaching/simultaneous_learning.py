@@ -169,9 +169,10 @@ class _Beliefs:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the results: "variants" has a row for each variant, "claims" the judged claims.
+    """Return the results: "variants" is a list with a row for each variant, "claims" a list with the judged claims, as dicts.
 
-    The claims are absent if a variant has no run.
+    A row is a dict of text: "variant", "problem-tries" (attempts to reach one target), "failed transitions", and "score" and "L1 error"
+    after numbers of actions.  The claims are absent if a variant has no run.
     """
     runs = runs_of(found)
     results: dict[str, Any] = {"variants": [_row(variant, group) for variant, group in runs.items()]}

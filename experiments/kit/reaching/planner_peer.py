@@ -56,8 +56,8 @@ class PeerMemory:
     def blocked(self, aim: Array, end: Array, target: ReachTarget, touched: bool) -> None:
         """Record that a motion to the pose `aim` ended in another pose `end`, both (d,) rad, and avoid a pose near its end.
 
-        This pose is ahead of `end` towards `aim`, at the distance 0.08, where each motor's difference is a share of its range, or it is
-        `aim` if that is nearer.  `touched`: whether the target was touched; the pose is then avoided only for this target.
+        The avoided pose lies on the line from `end` to `aim`, at the distance 0.08, where each motor's difference is a share of its range;
+        or it is `aim` if that is nearer.  `touched`: whether the target was touched; the pose is then avoided only for this target.
         """
         left = (aim - end) / self._span
         ahead = end + min(1.0, NEAR / max(float(np.linalg.norm(left)), 1e-9)) * (aim - end)
@@ -71,7 +71,7 @@ class PeerMemory:
         self._at_target.setdefault(place_of(target), []).append(pose)
 
     def of(self, target: ReachTarget) -> tuple[Array, Array]:
-        """Return the poses to avoid for a target, (B, d) rad: first all of them, then those that are avoided for this target only."""
+        """Return two arrays of poses to avoid for a target, (B, d) rad each: all of them, and those avoided for this target only."""
         here = self._at_target.get(place_of(target), [])
         everything, alone = (np.array(poses).reshape(-1, len(self._span)) for poses in (self._always + here, here))
         return everything, alone
@@ -101,8 +101,8 @@ class PeerPlans:
         """Return a path from the pose `here` (d,) rad to a target: its corners (k, d) rad, and the pose (d,) rad at the target.
 
         The last corner is the pose before the target, from which the hand moves straight to it.  If the poses that `memory` avoids leave no
-        path, new goal poses are drawn; then avoided poses are ignored, first those for all targets.  Returns None if there is still no
-        path.
+        path, new goal poses are drawn; if there is still none, avoided poses are ignored, first those for all targets.  Returns None if
+        this does not help either.
         """
         belief = self._belief
         belief.present(target)
@@ -168,11 +168,13 @@ ENDS: tuple[Ended, ...] = ("there", "used up", "no plan")
 
 @dataclass(frozen=True, slots=True)
 class PeerTry:
-    """The result of a try.
+    """The result of one attempt of the planner to bring the marker to a target.
 
-    `missing`: true remaining error, m.  `ended`: "there": the planner believes the marker at the target; "no plan": it found no path; "used
-    up": it made the largest number of actions, because motions were blocked or the target moved.  `actions`, `plans`: their numbers.
-    `seconds`: plant time.  `planning`: processor time, s.  `checked`: number of poses checked.
+    `missing`: true distance of the marker from the centre or surface of the target, at which it aims [m], after the last motion to a pose
+    at the target; at the end, if there was no such motion.  `ended`: "there": the planner believes the marker at the target; "no plan": it
+    found no path; "used up": it made the largest number of actions, because motions were blocked or the target moved.  `actions`: number of
+    motions.  `plans`: number of searches for a path.  `seconds`: duration in time of the plant [s].  `planning`: processor time of the
+    searches [s].  `checked`: number of poses checked for contacts.
     """
 
     missing: float
@@ -202,32 +204,32 @@ class PeerPlant(Protocol):
         ...
 
     def go(self, part: str, target: Array, marker: str) -> Outcome:
-        """Set the part's attractor to `target` (n_part,) rad and wait until the part settles or times out.
+        """Set the attractor of the part (the posture to which it moves) to `target` (n_part,) rad and wait until it settles or times out.
 
-        Meanwhile the presented target exerts no force on the marker's hand.
+        Meanwhile the presented target exerts no force on the hand with the marker `marker`.  Returns how the motion ended.
         """
         ...
 
     def present(self, target: ReachTarget | None) -> None:
-        """Put the target into the world, or move it there; None removes it, as in `mobee.reach.ReachPlant.present`."""
+        """Put the target into the world, or move it there if it is in it already; None removes it (see `mobee.reach.ReachPlant`)."""
         ...
 
     def missing(self, marker: str) -> float:
-        """Return the true remaining error of the marker now, m: its distance from the centre or surface of the target, at which it aims."""
+        """Return the true distance of the marker now from the centre or surface of the target, at which it aims [m]."""
         ...
 
 
 class PlannerPeer:
-    """Brings a marker to targets by planning, one try after the other, each from the present pose.
+    """Brings a marker to targets by planning, one target after the other, each from the present pose.
 
     Args:
         plant: the plant that moves; motors that take no part in the planning keep their initial position.
-        belief: the model with which paths are planned.
+        belief: the model of robot and world with which paths are planned; it may differ from the plant.
         part: name of the part of the motors.
-        memory: what is kept from earlier tries: "none": nothing; "blocked": where motions were blocked; "missed": also which poses missed
-            their target although nothing blocked the motion.
+        memory: what is kept from earlier attempts: "none": nothing; "blocked": where motions were blocked; "missed": also which poses
+            missed their target although nothing blocked the motion.
         seed: of random goals and paths.
-        limit: largest number of actions per try.
+        limit: largest number of actions (motions) per attempt.
     """
 
     def __init__(

@@ -48,8 +48,8 @@ class Reaches:
 def reaches_of(space: Space, marker: str, scale: float = SCALE) -> Reaches:
     """Compute the marker's position and Jacobian in each state of a space, with all other parts at home.
 
-    `scale`: unit of distances in thesis eqs. 8.1, 8.4, 8.5 and 8.7, m. Raises UnknownName if the robot has no such marker, InvalidValue if
-    the joints of the space do not move it.
+    A state stands for a pose of its joints; the other motors of the part are at `space.rest`. `scale`: unit of distances in thesis eqs.
+    8.1, 8.4, 8.5 and 8.7, m. Raises UnknownName if the robot has no such marker, InvalidValue if the joints of the space do not move it.
     """
     robot = space.robot
     part = robot.part(space.part)
@@ -58,9 +58,10 @@ def reaches_of(space: Space, marker: str, scale: float = SCALE) -> Reaches:
 
 
 def hands_of(space: Space, marker: str) -> Array:
-    """Compute the marker's position at the sample of each state, all other parts at home: shape (S, 3), in [m] in the root frame.
+    """Compute the marker's position in the sample of each state, shape (S, 3), in [m] in the root frame.
 
-    Raises UnknownName if the robot has no such marker, InvalidValue if the joints of the space do not move it.
+    The sample is the pose that stands for the state. The other motors of the part are at `space.rest`, and all other parts are at home.
+    Raises UnknownName if the robot has no such marker, InvalidValue if the marker has the same position in all states.
     """
     robot = space.robot
     robot.marker(marker)
@@ -71,7 +72,7 @@ def hands_of(space: Space, marker: str) -> Array:
 
 
 def _poses(space: Space) -> Array:
-    """Return all motors in each state, (S, n) rad."""
+    """Return the positions of all motors of the robot in each state, (S, n) rad."""
     robot = space.robot
     q = np.tile(robot.home, (len(space), 1))
     q[:, robot.part(space.part).slice] = [space.target(state) for state in range(len(space))]

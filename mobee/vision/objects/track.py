@@ -117,12 +117,15 @@ class Track:
 
     @property
     def rotation(self) -> Array:
-        """The rotation (3, 3) of the shape's axes in the root frame, averaged over looks."""
+        """The rotation (3, 3) of the shape's axes in the root frame: a turn about the vertical z axis, averaged over the looks.
+
+        A look is a pair of pictures at one time.
+        """
         return upright(self._yaw)
 
     @property
     def size(self) -> Array:
-        """The lengths (g,) m of the shape, averaged over looks."""
+        """The lengths (g,) m of the shape, averaged over the looks (a look is a pair of pictures at one time)."""
         return self._size.copy()
 
     @property
@@ -133,8 +136,8 @@ class Track:
     def innovation(self, placed: Placed, t: float, turned: float, moving: bool) -> Innovation:
         """Compare a seen position at time t [s] with the prediction of the track.
 
-        `turned`: angle [rad] by which the gaze has rotated since the last look. `moving`: predict for a moving object, else for one at
-        rest.
+        `turned`: angle [rad] by which the gaze has rotated since the last look (pair of pictures). `moving`: predict for a moving object,
+        else for one at rest.
         """
         mean, spread = self._predicted(t, turned, moving)
         covariance = _SEEN @ spread @ _SEEN.T + placed.noise
@@ -143,9 +146,9 @@ class Track:
     def best(self, placed: Placed, t: float, turned: float) -> tuple[Innovation, bool] | None:
         """Return the better innovation of a seen position at time t [s], and whether it is that of a moving object.
 
-        The prediction at rest is used, unless the object moves or the position is improbable at rest; then the prediction in motion is
-        used. None if the position is too improbable for this track (`TrackSettings.gate`). `turned`: angle [rad] by which the gaze has
-        rotated since the last look.
+        An innovation is the comparison of a seen position with the prediction. The prediction at rest is used, unless the object moves or
+        the position is improbable at rest; then the prediction in motion is used. None if the position is too improbable for this track
+        (`TrackSettings.gate`). `turned`: angle [rad] by which the gaze has rotated since the last look (pair of pictures).
         """
         if t > self._moving_until:
             rest = self.innovation(placed, t, turned, moving=False)
@@ -157,7 +160,7 @@ class Track:
     def update(self, placed: Placed, t: float, found: Innovation, moved: bool) -> None:
         """Update the track with a seen position at time t [s].
 
-        `found`: the comparison of the position with the prediction. `moved`: whether this is the prediction for a moving object. Both are
+        `found`: the comparison of the position with the prediction. `moved`: whether the prediction was that for a moving object. Both are
         returned by `best`.
         """
         gain = np.linalg.solve(found.covariance, _SEEN @ found.spread).T
@@ -174,7 +177,7 @@ class Track:
         self.looks.append(True)
 
     def miss(self, t: float, turned: float) -> None:
-        """Predict the track to a look at time t [s] that did not show the object.
+        """Predict the track to time t [s], at which a pair of pictures (a look) did not show the object.
 
         `turned`: angle [rad] by which the gaze has rotated since the last look.
         """

@@ -139,9 +139,12 @@ def judged_claims(folder: Path) -> dict[str, Any]:
 
 
 def results(folder: Path) -> dict[str, Any]:
-    """Return the claims and the tables, computed from the finished blocks in the folder of a run.
+    """Return the claims and the tables, computed from the finished blocks (all tries of one job) in the folder of a run.
 
-    To explain each missed try of the learner, reaches from all states are simulated offline.
+    Keys: "claims", a list with the judged claims, as dicts (`Claim.record`); "tries", a list with the rows of `table`; "missed", a list
+    with the rows of `misses`; "targets that can be reached" and "targets that the robot's own fields keep the palm from", lists of their
+    numbers; "repeatable", whether all runs in which nothing is moved can be repeated exactly.  To explain each missed try of the learner,
+    reaches from all states are simulated offline.
     """
     blocks, known, left = _blocks(folder), _touchable(), _left()
     return {

@@ -127,9 +127,10 @@ class Block(Struct, frozen=True):
 
 
 def measure(folder: Path, job: Job, rate: float, repeatable: bool) -> Block:
-    """Return the block of a finished launch: measures of its tries, computed from the records in its folder.
+    """Return the block of a finished launch: the measures of its tries, in order, computed from the records in its folder.
 
-    `rate`: ticks per second.  `repeatable`: whether the launch can be repeated exactly.
+    A launch is one run of the system, in which the tries of `job` were made.  `rate`: ticks per second [Hz].  `repeatable`: whether the
+    launch can be repeated exactly.
     """
     q = np.fromfile(folder / POSITIONS).reshape(-1, len(robot().motors))
     deep = [touch for touch in read_touches(folder / CONTACTS, 1.0 / rate) if touch.depth > MIN_DEPTH]
@@ -185,7 +186,7 @@ def write_block(folder: Path, block: Block) -> None:
 
 
 def read_block(folder: Path) -> Block:
-    """Read the block that `write_block` has written to the folder."""
+    """Read the block (all tries of one job with their measures) that `write_block` has written to the folder."""
     return decoded((folder / BLOCK).read_text(), Block)
 
 
@@ -219,7 +220,11 @@ def _contacts(plant: OfflinePlant, q: Array) -> str:
 
 
 def main() -> None:
-    """Print a table of the targets that can be reached, with the best offline reach and the contacts at its end."""
+    """Print a table, in Markdown, of the targets that can be reached, with the best offline reach and the contacts at its end.
+
+    A row has the number of the target, its position [m], the distance [mm] of the palm from it after the best reach, and the contacts there
+    if the reach missed.
+    """
     known, plant = belief(), offline_plant(0)
     lines = ["| target | x | y | z | best reach [mm] | contacts there [mm] |", "| --- | --- | --- | --- | --- | --- |"]
     for number, target in enumerate(grid_targets()):

@@ -66,16 +66,19 @@ class Reached:
         return float(np.maximum(within, 0.0).sum())
 
     def find(self, target: Array) -> int | None:
-        """Return the index of a target (3,) m in `places`; None if it was never tried."""
+        """Return the index of a target (3,) m, root frame, in `places`; None if it was never tried."""
         return self._target_of.get(target.tobytes())
 
     def pair(self, state: int, target: Array) -> int | None:
-        """Return the index of a pair of state and target (3,) m; None if the pair was never tried."""
+        """Return the index of a pair of a state and a target (3,) m, root frame; None if the pair was never tried."""
         known = self.find(target)
         return None if known is None else self._pair_of.get((state, known))
 
     def add(self, state: int, target: Array, reward: float) -> int:
-        """Record one reach; return the index of its pair of state and target. The first reach of a pair adds the pair."""
+        """Record one reach that began in `state`, for a target (3,) m in the root frame, and its reward; return the index of its pair.
+
+        A pair is a state and a target. The first reach of a pair adds the pair at the end.
+        """
         key = target.tobytes()
         place = self._target_of.setdefault(key, len(self._target_of))
         self._places = grown(self._places, place)
@@ -92,7 +95,7 @@ class Reached:
 
 
 def around(known: Reached) -> tuple[float, float]:
-    """Return the average and the variance of the average rewards of all pairs.
+    """Return the average and the variance of the average rewards of all pairs of state and target.
 
     Four imagined pairs, with average 0.3 and standard deviation 0.25, are included, so that both results exist before the first reach.
     """
@@ -116,7 +119,7 @@ class Independent(ABC):
         """The name of the predictor and the settings that determine its predictions, as JSON values."""
 
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:
-        """Learn from the reward of a reach that began in `state`, for a target (3,) m. `expected` is not used."""
+        """Learn from the reward of a reach that began in `state`, for a target (3,) m, root frame. `expected` is not used."""
         self._reached.add(state, target, reward)
 
     def mean(self, target: Array) -> Array:
@@ -134,4 +137,7 @@ class Independent(ABC):
 
     @abstractmethod
     def _posterior(self, target: Array) -> tuple[Array, Array]:
-        """Return means and standard deviations of the mean rewards for a target (3,) m, each (S,), which the caller may change."""
+        """Return means and standard deviations of the mean rewards of the states for a target (3,) m, root frame, each (S,).
+
+        The caller may change the arrays.
+        """
