@@ -136,16 +136,19 @@ class WorldChanges:
     """Detects changes of the world from a learner's steps, and reports them to the learner's memory of failures.
 
     Args:
-        detector: decides when the world has changed.
+        make_detector: makes the detector, which decides when the world has changed.
         planning: gives the probabilities of the outcomes of transitions.
         predictor: gives the standard deviations of rewards; if it has none, only reaches that repeat an earlier reach are informative.
         failures: the memory of failures; its method `change` is called with the number of transitions since the change.
     """
 
-    def __init__(self, detector: Detector, planning: ReachPlanning, predictor: RewardPredictor, failures: FailuresSinceChange) -> None:
+    def __init__(
+        self, make_detector: DetectorOf, planning: ReachPlanning, predictor: RewardPredictor, failures: FailuresSinceChange
+    ) -> None:
         self.detected: list[int] = []
         """The numbers of the steps at which changes were detected."""
-        self._detector, self._planning, self._predictor, self._failures = detector, planning, predictor, failures
+        self._make_detector, self._detector = make_detector, make_detector()
+        self._planning, self._predictor, self._failures = planning, predictor, failures
         self._scale = RewardScale()
         self._is_reach: list[bool] = []  # of all outcomes that the detector got
 
@@ -180,8 +183,16 @@ class WorldChanges:
         return True
 
     def report(self) -> None:
-        """Record a change of the world that is known without detection: only transitions from now on count as made since the change."""
+        """Record a change of the world that is known without detection: only transitions from now on count as made since the change.
+
+        The detector starts anew, because the outcomes before the change are no evidence about changes after it.
+        """
         self._failures.change(0)
+        self.restart()
+
+    def restart(self) -> None:
+        """Make a new detector; what was learned since the last change stays."""
+        self._detector = self._make_detector()
 
     def _variance(self, state: int, target: Array) -> float | None:
         """Return the variance of the reward to expect; None if it is unknown."""

@@ -59,7 +59,7 @@ class AlikeFailures:
         self._sums: dict[bytes, tuple[int, Array]] = {}  # by target: events in them, failures and weights (2, S A)
 
     def add(self, state: int, action: int, target: Array, reward: float, touched: tuple[str, ...] = ()) -> None:
-        """Record the reward of a transition: 0 if it succeeded, below 0 if it failed.
+        """Record the reward of a transition, an action in a state: 0 if it succeeded, below 0 if it failed.
 
         `target`: (3,) m, the target that was presented meanwhile. `touched`: not used.
         """
@@ -134,7 +134,7 @@ class Failures:
         self._histories = Histories(states * actions, scale, NEAR_DISTANCE if kind == "local" else np.inf)
 
     def add(self, state: int, action: int, target: Array, reward: float, touched: tuple[str, ...] = ()) -> None:
-        """Record the reward of a transition: 0 if it succeeded, below 0 if it failed.
+        """Record the reward of a transition, an action in a state: 0 if it succeeded, below 0 if it failed.
 
         `target`: (3,) m, the target that was presented meanwhile. `touched`: not used.
         """
@@ -180,7 +180,7 @@ class FailuresSinceChange:
         self._clear()
 
     def add(self, state: int, action: int, target: Array, reward: float, touched: tuple[str, ...] = ()) -> None:
-        """Record the reward of a transition: 0 if it succeeded, below 0 if it failed.
+        """Record the reward of a transition, an action in a state: 0 if it succeeded, below 0 if it failed.
 
         `target`: (3,) m, the target that was presented meanwhile. `touched`: names of the world objects in contact at the end.
         """
@@ -199,7 +199,10 @@ class FailuresSinceChange:
             self._learn(*one)
 
     def blocked(self, state: int, action: int) -> float:
-        """Return the probability that the world, since its change, blocks a transition; 0 before the first change."""
+        """Return the probability that the world, since its change, blocks a transition; 0 before the first change.
+
+        The transition is that by `action` from `state`.
+        """
         if not self._changed:
             return 0.0
         transition = state * self._shape[1] + action

@@ -21,7 +21,7 @@ def grown(array: NDArray[Scalar], index: int) -> NDArray[Scalar]:
 
 
 def forget(found: dict[bytes, Any], most: int) -> None:
-    """Delete the oldest entries of a dict until fewer than `most` remain, to limit the size of a cache.
+    """Delete the oldest entries of the dict `found` until fewer than `most` remain, to limit the size of a cache.
 
     The oldest entry is the one inserted first. Callers delete and insert an entry at each use, so that the entry used least recently is
     deleted.

@@ -106,7 +106,7 @@ class ReachLearner:
             self._detector_name, make_detector = named("detector", settings.detector, DETECTORS)
             assert make_detector is not None  # only NONE has none
             self.failures = FailuresSinceChange(space, reaches, self.failures)
-            self.changes = WorldChanges(make_detector(), self.planning, self.predictor, self.failures)
+            self.changes = WorldChanges(make_detector, self.planning, self.predictor, self.failures)
         self.discount, self.penalty, self.limit, self.seed = settings.discount, settings.penalty, settings.limit, settings.seed
         self._strategy, self._failures_kind = make_strategy(reaches, self.predictor), settings.failures
         self._draws, self._draws_of_try, self._draws_of_problem = (
@@ -207,7 +207,10 @@ class ReachLearner:
             self.observe(step)
 
     def problem_draws(self) -> np.random.Generator:
-        """Return the random generator for the choice of the next problem; it depends on the seed and the number of problem-tries."""
+        """Return the random generator for the choice of the target of the next problem-try (one attempt to reach a target).
+
+        Its numbers depend only on the part, the seed and the number of problem-tries that have ended. It is valid until the next call.
+        """
         return self._draws_of_problem.at(self.seed, self.tries)
 
     @property

@@ -136,6 +136,8 @@ class ReachAgent(ReachLearner):
             self.learn(problems, tries)
         finally:
             self.plant, self._state = own, None
+            if self.changes is not None:
+                self.changes.restart()  # differences between the two plants are no change of the world
 
     def plan(self, target: ReachTarget, state: int | None = None) -> ReachPlan:
         """Plan a reach for a target from a state (None: from the present one), without moving or learning."""

@@ -72,7 +72,7 @@ class ReachTable(TabularPlant):
         """Perform the action of the present state that aims at `target` (n_part,) rad; an action counts as 1 s.
 
         If the presented target blocks the action, it ends in its start state and touches the target. Raises InvalidValue if the state has
-        no such action.
+        no such action. `part`: must be the part of the space.
         """
         if self._presented is not None:
             action = self._action[self.state].get(self.space.state_of(target))
@@ -82,10 +82,12 @@ class ReachTable(TabularPlant):
         return super().act(part, target)
 
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
-        """Reach for the presented target; the remaining distance is that of the table, with noise, and the part stays in its state.
+        """Reach for the target that was given to `present`, from the present state; the part stays in this state.
 
-        A reach counts as 2 s. The position of the marker in the outcome is always 0. `stay` is not used. Raises InvalidValue if no target
-        is presented.
+        The remaining distance in the outcome is the mean distance that the function `world` gives for target and state, plus noise. The
+        position of the marker in the outcome is always (0, 0, 0). A reach counts as 2 s. `part`: the part of the space. `marker`: name of
+        the marker, only for the error message. `stay`: not used. Raises InvalidValue if no target is presented, and UnknownName for another
+        part.
         """
         if self._presented is None:
             raise InvalidValue(f"nothing to reach for with the {marker}: present a target first.")

@@ -76,7 +76,10 @@ class Posterior:
         return known.mean, known.covariance
 
     def append(self, state: int, target: Array, residual: float) -> None:
-        """Add one reach. `residual`: its reward minus the prior mean."""
+        """Add one reach.
+
+        `state`: number of the state from which it was made. `target`: (3,) m, root frame. `residual`: its reward minus the prior mean.
+        """
         known = self._updated(target)
         row = self._used
         if row == len(self._score):

@@ -287,6 +287,24 @@ def test_practice_on_another_plant_is_learned_and_moves_the_own_robot_not_at_all
     assert reacher.failures.rewards(np.ones(3))[0, 0] < -1.0  # for all targets
 
 
+def test_the_detector_starts_anew_before_and_after_practice():
+    """Neither the change that is perceived nor the differences of the two plants are evidence about later changes."""
+    outcomes = []
+
+    class Counting:
+        def __init__(self):
+            outcomes.append(0)
+
+        def add(self, learned, unknown):
+            outcomes[-1] += 1
+
+    reacher = corridor(detector=Counting)
+    reacher.learn([GOAL], 5)
+    reacher.practise(corridor().plant, [GOAL], 3)
+    reacher.learn([GOAL], 2)
+    assert len(outcomes) == 3 and all(outcomes)
+
+
 def test_practice_does_not_write_into_a_store(tmp_path):
     with ReachStore(tmp_path / "steps.sqlite", "left_arm") as store:
         reacher = corridor(store=store)
