@@ -127,7 +127,7 @@ class Finished(NamedTuple):
 
 
 def runs_in(folders: Sequence[Path]) -> dict[str, Finished]:
-    """Return the finished run of each experiment in these folders, by the experiment's name; runs whose results have no claims are ignored.
+    """Return a dict from the name of each experiment in these folders to its finished run; runs whose results have no claims are ignored.
 
     A folder is that of an experiment's run, or that of a chapter's run, which has a folder for each experiment.  Of several runs of one
     experiment, the one with the most seeds is returned, of equal ones the last.  Raises InvalidValue for a folder without results.

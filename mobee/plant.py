@@ -65,12 +65,15 @@ class Perceiving(Protocol):
     """A plant that perceives objects and reports their positions."""
 
     def perceive(self) -> Mapping[str, Array]:
-        """Return the present position (3,) m, root frame, of each perceived object, by name."""
+        """Return a dict from the name of each perceived object to its present position (3,) m, root frame."""
         ...
 
 
 def present_outcome(plant: Plant, part: str) -> Outcome:
-    """Return what a plant measures and perceives at present, in the form of an outcome: settled, duration 0, nothing touched."""
+    """Return what a plant measures and perceives at present, in the form of an outcome: settled, duration 0, nothing touched.
+
+    `part`: name of the part whose motors are measured.
+    """
     return Outcome(plant.measure(part), True, 0.0, perceived=plant.perceive() if isinstance(plant, Perceiving) else {})
 
 
@@ -103,7 +106,7 @@ class PerceivingPlant:
         return replace(self.plant.act(part, target), perceived=self.perceive())
 
     def perceive(self) -> Mapping[str, Array]:
-        """Return the present position (3,) m, root frame, of each perceived object, by name."""
+        """Return a dict from the name of each perceived object to its present position (3,) m, root frame."""
         return self._perceive()
 
     @property

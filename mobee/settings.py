@@ -75,7 +75,7 @@ class Settings:
 
 
 def hints_of(settings: type[Settings]) -> dict[str, Any]:
-    """Return the type of each field of a settings class, by the field's name; the type includes the `Range` annotation, if any."""
+    """Return a dict from the name of each field of a settings class to its type; the type includes the `Range` annotation, if any."""
     hints = get_type_hints(settings, include_extras=True)
     return {field.name: hints[field.name] for field in fields(settings)}
 
@@ -106,7 +106,7 @@ def named(kind: str, given: str | T, table: Mapping[str, T]) -> tuple[str, T]:
 
     Args:
         kind: what is named, for the messages: "explorer", "strategy".
-        given: a name in the table; or `module:name` of a function or class that can be imported; or the function or class itself,
+        given: a name in `table`; or `module:name` of a function or class that can be imported; or the function or class itself,
             which is recorded as the `module:name` where it was defined.
         table: the functions and classes that have a short name, by this name.
 

@@ -263,7 +263,7 @@ class TransitionStore(AgentFile):
         return [t for (t,) in rows]
 
     def agents(self) -> tuple[str, ...]:
-        """Return the names of the agents that have transitions in the file, sorted."""
+        """Return the names of the agents that have transitions in the SQLite file, sorted."""
         with explained(self.path):
             return tuple(name for (name,) in self._db.execute("SELECT DISTINCT agent FROM transitions ORDER BY agent"))
 

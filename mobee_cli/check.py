@@ -50,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run `mobee check`: check the file, print the findings, and return the exit code (0: at most notes, 1: something is wrong)."""
+    """Run `mobee check`: check a robot or world file, print the findings, and return the exit code (0: at most notes, 1: a fault)."""
     try:
         world = load_world(arguments.world) if arguments.world else None
         written = _write_srdf(arguments) if arguments.write_srdf is not None else None

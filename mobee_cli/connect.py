@@ -35,7 +35,7 @@ def endpoint(text: str) -> str:
 def connected(endpoint: str, patience: float = PATIENCE) -> Iterator[Any]:
     """Open a session with the running system for the block of a `with` statement.
 
-    Raises UserError if no system answers within `patience` s.
+    `endpoint`: address of the router. Raises UserError if no system answers within `patience` s.
     """
     from services.common.session import BusUnreachable, open_client  # it needs zenoh, and `mobee doctor` works without
 

@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run `mobee convert`: write the file, print what it contains and what the new format cannot express, and return the exit code."""
+    """Run `mobee convert`: write the converted file, print its content and what the new format cannot express; return the exit code."""
     target: Path = arguments.target
     if target.suffix.lower() not in WRITERS:
         raise UserError(f"{target}: OUT must end in .xml or .urdf", BAD_INPUT)

@@ -32,7 +32,7 @@ _IN_THE_RUN = Path()
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options of `mobee export` to the parser: the run, and the kind and name of the file."""
+    """Add the options of `mobee export` to the parser: the recorded run, and kind and name of the file to write."""
     parser.epilog = _NOTES
     parser.add_argument(
         "run", type=Path, metavar="RUN", help=f"folder of a run of `mobee launch` or `mobee experiment`, or a file such as {STORE}"
@@ -53,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run `mobee export`: write the table, print its number of rows, and return the exit code."""
+    """Run `mobee export`: write a table of the recorded data, print its number of rows, and return the exit code."""
     if not arguments.run.exists():
         raise UserError(f"{arguments.run}: there is no such folder; give the folder of a run, one of those in runs/", BAD_INPUT)
     file: Path = arguments.parquet or arguments.csv or arguments.reaches or _IN_THE_RUN

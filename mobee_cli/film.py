@@ -17,7 +17,7 @@ twice the robot's speed, with the stories of up to three agents."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options of `mobee film` to the parser: the folder of the run and the file."""
+    """Add the options of `mobee film` to the parser: the folder of the run, and the file to write."""
     parser.epilog = _NOTES
     parser.add_argument("run", type=Path, metavar="RUN", help="folder of a run that had a monitor")
     parser.add_argument("--to", type=Path, metavar="FILE", help="film.gif or film.mp4 (default: film.gif in the folder)")

@@ -64,7 +64,7 @@ class LivePlant(BusPlant):
     def measure(self, part: str) -> Array:
         """Measure the motor positions of a part, (n_part,) rad.
 
-        Raises UserError if the part stays in hold for 8 s, or another client owns it.
+        Raises UserError if the part stays in hold (stands still, follows no commands) for 8 s, or another client owns it.
         """
         with self._timeout(CONTROL_TIMEOUT, f"{part} is in hold: `mobee status` shows why, `mobee estop --reset` ends an emergency stop"):
             try:

@@ -65,10 +65,10 @@ class Agreement:
 
 
 def lockstep(ticks: int, seed: int, folder: Path) -> tuple[dict[str, list[Transition]], dict[str, Any]]:
-    """Run three live agents in lockstep for `ticks` ticks.
+    """Run three live agents in lockstep (every tick waits for all participants) for `ticks` ticks.
 
-    Returns the transitions of each part, by the name of the part, and the summary of the run.  The files of the run are in a new folder in
-    `folder`.
+    Returns a dict from the name of a part to its transitions, and the summary of the run.  The files of the run are in a new folder in
+    `folder`.  `seed`: of the run.
     """
     summary = summary_of("lockstep", [f"shared.seed={seed}", PATIENCE], ticks=ticks, runs=folder)
     file = Path(summary["run"]) / "transitions.sqlite"
@@ -78,7 +78,7 @@ def lockstep(ticks: int, seed: int, folder: Path) -> tuple[dict[str, list[Transi
 def offline(actions: int, seed: int, folder: Path) -> dict[str, list[Transition]]:
     """Run the same three agents on the offline plant for `actions` actions in all.
 
-    Returns the transitions of each part, by the name of the part.  The file of the transitions is in `folder`.
+    Returns a dict from the name of a part to its transitions.  The file of the transitions is in `folder`.  `seed`: of plant and agents.
     """
     robot, world = load_robot("icub"), load_world("table")
     world.remove("ball")  # live, it is not seen without cameras

@@ -69,7 +69,7 @@ class Player:
 
 
 def players(steps: int) -> dict[str, Player]:
-    """Return a player for each environment, by the name of the environment (the keys of UNITS).
+    """Return a dict from the name of each environment (a key of UNITS) to a player.
 
     `steps`: number of steps of each player in a run; the batch of Reach-v0 makes four times as many.  Raises NotInstalled without
     Gymnasium, MuJoCo or imageio.

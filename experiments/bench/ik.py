@@ -137,7 +137,10 @@ def scene() -> mobee.Model:
 
 
 def targets(model: mobee.Model, count: int, seed: int = 0) -> list[Target]:
-    """Return `count` poses of the palm that can be reached: those in random postures of torso and arm without a contact."""
+    """Return `count` poses of the palm that can be reached: those in random postures of torso and arm without a contact.
+
+    `seed`: of the postures.
+    """
     robot, rng = model.robot, np.random.default_rng(seed)
     columns = [*range(robot.part("torso").start, len(robot.part("torso"))), *(robot.motor_index(name) for name in MOTORS[1:])]
     low, high = robot.limits[columns].T
@@ -201,7 +204,7 @@ def mink(model: mobee.Model) -> Solve:
 def timed(solve: Solve, aim: Target, seed: int) -> tuple[bool, int, float]:
     """Solve the inverse kinematics of one target.
 
-    Returns whether a pose was found, the number of evaluations, and the processor time [ms].
+    Returns whether a pose was found, the number of evaluations, and the processor time [ms].  `seed`: for the solver.
     """
     (reached, evaluations), seconds = processor_time(lambda: solve(aim, seed))
     return reached, evaluations, 1e3 * seconds
@@ -221,7 +224,7 @@ class Tries:
     standard_ms: list[float] = field(default_factory=list)  # on the standard machine, see calibration.py
 
     def add(self, solve: Solve, aim: Target, seed: int, speeds: Calibration) -> None:
-        """Solve one more target and append the result.  `speeds` measures the speed of this machine."""
+        """Solve one more target and append the result.  `seed`: for the solver.  `speeds` measures the speed of this machine."""
         (reached, evaluations, ms), speed = speeds.around(lambda: timed(solve, aim, seed))
         self.reached.append(reached)
         self.evaluations.append(evaluations)

@@ -69,7 +69,8 @@ class Target:
 def xnes(problem: Problem, seed: int, most: int) -> Array | None:
     """Search for a pose by xNES as published (Glasmachers 2010), with its default population and with the library's limits and restarts.
 
-    Returns a pose (n,) rad within all tolerances, or None after `most` evaluations.
+    Returns a pose (n,) rad within all tolerances, or None after `most` evaluations.  `seed`: of the random numbers.  `most`: largest number
+    of evaluations.
     """
     low, high = problem.limits.T
     start, restart = problem.start[problem.free], Restart(patience=XNES_PATIENCE)
@@ -81,7 +82,7 @@ def cma(problem: Problem, seed: int, most: int, batched: bool) -> Array | None:
     """Search for a pose by CMA-ES with its default population.  It restarts at a random posture whenever its own criteria stop it.
 
     `batched`: the poses of a generation are evaluated in one batch, not one by one.  Returns a pose (n,) rad within all tolerances, or None
-    after `most` evaluations.
+    after `most` evaluations.  `seed`: of the random numbers.  `most`: largest number of evaluations.
     """
     rng = np.random.default_rng(seed)
     start = _units(problem, problem.start[problem.free])
@@ -100,7 +101,8 @@ def annealing(problem: Problem, seed: int, most: int) -> Array | None:
     """Search for a pose by simulated annealing, one pose at a time.
 
     The size of the steps and the temperature decrease together during ANNEALING_PERIOD (4000) poses; then the search restarts at the best
-    pose.  Returns a pose (n,) rad within all tolerances, or None after `most` evaluations.
+    pose.  Returns a pose (n,) rad within all tolerances, or None after `most` evaluations.  `seed`: of the random numbers.  `most`: largest
+    number of evaluations.
     """
     rng = np.random.default_rng(seed)
     best = here = there = _units(problem, problem.start[problem.free])
@@ -131,7 +133,8 @@ def particles(problem: Problem, seed: int, most: int) -> Array | None:
     """Search for a pose by a particle filter.
 
     In each generation particles are resampled by their costs, and noise is added.  The noise decreases; when it is small, the search
-    restarts with uniform random particles.  Returns a pose (n,) rad within all tolerances, or None after `most` evaluations.
+    restarts with uniform random particles.  Returns a pose (n,) rad within all tolerances, or None after `most` evaluations.  `seed`: of
+    the random numbers.  `most`: largest number of evaluations.
     """
     rng = np.random.default_rng(seed)
     noise, places = 0.0, rng.uniform(size=(PARTICLES, len(problem.free)))
@@ -195,7 +198,7 @@ class MinkPeer:
         """Return a pose (n,) rad within all tolerances, or None after `most` evaluations.
 
         The starts are those of the library's least squares: first home, then by turns near home and anywhere.  Steps and contact checks
-        count as evaluations.
+        count as evaluations.  `seed`: of the random numbers.  `most`: largest number of evaluations.
         """
         rotation = self._mink.SO3.from_matrix(target.rotation)
         self._task.set_target(self._mink.SE3.from_rotation_and_translation(rotation, target.position))

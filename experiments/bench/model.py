@@ -164,7 +164,7 @@ def summarized(
 
 
 def contestants(robot: Robot, boxes: int, poses: int) -> dict[str, Contestant]:
-    """Return all contestants on the same robot, world and poses, by name.
+    """Return a dict from the name to each contestant; all have the same robot, world and poses.
 
     `boxes`: number of boxes in the world.  `poses`: number of poses of a run of ours and of MuJoCo; python-fcl does fewer.
     """

@@ -121,7 +121,7 @@ def _add_servos(mujoco: Any, spec: Any, joints: int, gain: float) -> None:
 def us_per_tick(plant: OfflinePlant, ticks: int, seed: int = 0) -> float:
     """Return MuJoCo's processor time [us] for the steps of one control tick, while random velocities are commanded to the joints.
 
-    `plant`: its robot, world, tick and substeps are used.  `ticks`: number of timed ticks.
+    `plant`: its robot, world, tick and substeps are used.  `ticks`: number of timed ticks.  `seed`: of the velocities.
     """
     alive = np.isin(np.arange(len(plant.robot.motors)), plant.motors.living)
     robot = stiffened(plant.robot, alive, solids=False)

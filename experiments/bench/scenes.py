@@ -89,7 +89,10 @@ def boxes_world(boxes: int) -> World:
 
 
 def upper_body_poses(count: int, seed: int = POSE_SEED) -> Array:
-    """Return random poses (count, 41) rad of the upper body, uniform between the motors' limits."""
+    """Return random poses (count, 41) rad of the upper body, uniform between the motors' limits.
+
+    `seed`: of the draw.
+    """
     low, high = upper_body().limits.T
     return np.random.default_rng(seed).uniform(low, high, (count, len(low)))
 
@@ -111,7 +114,10 @@ class Maker:
     around: tuple[ShapeKind, ...]
 
     def robot(self, seed: int = MAKER_SEED) -> Robot:
-        """Return the random robot with 31 motors.  All its volumes are fields, so that they cause repulsive forces."""
+        """Return the random robot with 31 motors.  All its volumes are fields, so that they cause repulsive forces.
+
+        `seed`: of the draw.
+        """
         return _random_robot(self, seed)
 
     def world(self, objects: int, seed: int = MAKER_SEED) -> World:
@@ -124,7 +130,10 @@ class Maker:
         return made
 
     def poses(self, count: int, seed: int = MAKER_SEED) -> Array:
-        """Return random poses (count, 31) rad of the robot, uniform between the motors' limits."""
+        """Return random poses (count, 31) rad of the robot, uniform between the motors' limits.
+
+        `seed`: of the draw.
+        """
         low, high = self.robot().limits.T
         return np.random.default_rng([seed, 2]).uniform(low, high, (count, len(low)))
 

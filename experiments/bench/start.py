@@ -131,7 +131,7 @@ def _system(seconds: float, speeds: Calibration) -> dict[str, Any]:
 
 
 def mebibytes(launcher: int) -> dict[str, float]:
-    """Return the memory [MiB] of a launcher and of the services it has started, by name.
+    """Return a dict from the name of a launcher and of each service it has started to its memory [MiB].
 
     `launcher`: process id.  The memory is the PSS: memory that n processes share counts 1/n for each.  A process that has ended is absent.
     """

@@ -63,7 +63,10 @@ def processor_time(run: Callable[[], T]) -> tuple[T, float]:
 
 
 def medians(rounds: Sequence[Mapping[str, float]]) -> dict[str, float]:
-    """Return the median over the rounds of each number, by its key.  `rounds`: the numbers of each round, all with the same keys."""
+    """Return a dict from the key of each number to its median over the rounds.
+
+    `rounds`: the numbers of each round, all with the same keys.
+    """
     return {key: float(np.median([one[key] for one in rounds])) for key in rounds[0]}
 
 

@@ -185,7 +185,7 @@ def problem_of_size(states: int, observations: int = 3, seed: int = 0) -> Changi
     """Return a random decision problem with this number of states, and changes of action 0 in `observations` random states.
 
     Each state has 16 actions to states of similar number.  An action has three outcomes: the goal, the same state, or the state after the
-    goal.
+    goal.  `seed`: of the draw.
     """
     rng = np.random.default_rng(seed)
     goals = (np.arange(states)[:, None] + rng.integers(-MAX_STATE_STEP, MAX_STATE_STEP + 1, (states, ACTIONS))) % states
@@ -199,7 +199,7 @@ def problem_of_size(states: int, observations: int = 3, seed: int = 0) -> Changi
 def after_transitions(transitions: int, observations: int, seed: int = 0) -> ChangingProblem:
     """Return the transition model of a curious agent after `transitions` transitions, and its next observations as changes.
 
-    The agent moves an arm with 81 states and 16 actions per state.
+    The agent moves an arm with 81 states and 16 actions per state.  `seed`: of agent and plant.
     """
     space = arm_space(neighbours=ACTIONS)
     agent = CuriousAgent(space, TabularPlant(space, *half_space(space), seed=seed), seed=seed)
@@ -220,10 +220,10 @@ def _tables_of(agent: CuriousAgent) -> Tables:
 
 
 def contestants(problem: ChangingProblem, discount: float = DISCOUNT, repeats: int = 20) -> dict[str, Contestant]:
-    """Return a contestant for each solver of the problem, by the solver's name; each run repeats its plans `repeats` times.
+    """Return a dict from the name of each solver to a contestant; each run repeats its plans `repeats` times.
 
     "ours, warm" plans after each change of the problem and starts from the values of the plan before.  Raises ArithmeticError if a peer's
-    values differ from the exact ones by more than the tolerance allows.
+    values differ from the exact ones by more than the tolerance allows.  `discount`: factor of future rewards.
     """
     first = problem.tables
     peer = DecisionProblem(first, first.reward, discount, TOLERANCE)

@@ -99,7 +99,7 @@ def cell_path(folder: Path, name: str) -> Path:
 
 
 def load_cells(folder: Path) -> dict[str, CellResult]:
-    """Return the finished cells in the folder of a run, by the cell's name, sorted; raises InvalidValue for a damaged file."""
+    """Return a dict from the name (sorted) of each finished cell in the folder of a run to the cell; InvalidValue for a damaged file."""
     return {path.stem: read_cell(path) for path in sorted((folder / FOLDER).glob("*.npz"))}
 
 

@@ -35,7 +35,7 @@ SLOW = float(np.deg2rad(1.0))  # rad/s, of motors at rest
 
 
 class PhysicsPlant:
-    """A `mobee.reach.ReachPlant` whose body MuJoCo simulates, under the law's default gains and with the published motors.
+    """A `mobee.reach.ReachPlant` whose body MuJoCo simulates, under the control law's default gains and with the published motors.
 
     Args:
         model: the robot in the world as it is believed to be.
@@ -73,7 +73,7 @@ class PhysicsPlant:
 
     @property
     def things(self) -> Mapping[str, WorldObject]:
-        """The objects of the physics by name, where they truly are."""
+        """A dict from the name of each object of the physics engine to the object at its true pose."""
         return self.body.world.objects
 
     def every_tick(self, callback: Callable[[float], None] | None) -> None:

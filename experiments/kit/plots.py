@@ -34,7 +34,7 @@ def new_figure(width: float, height: float) -> Any:
 
 
 def saved(drawing: Any, folder: Path, dpi: int = 150) -> Path:
-    """Save a Matplotlib Figure as figure.png in the folder of a run, with `dpi` pixels per inch; returns the path."""
+    """Save the Matplotlib Figure `drawing` as figure.png in the folder of a run, with `dpi` pixels per inch; returns the path."""
     path = folder / "figure.png"
     drawing.savefig(path, dpi=dpi)
     return path
@@ -51,7 +51,8 @@ def finish(axes: Any, legend: float = 0.0, **settings: Any) -> None:
 def finish_normalised(axes: Any) -> None:
     """Complete a plot of cumulative distributions of normalised squared errors in 3-D: add a reference curve, axis labels and a legend.
 
-    The curve is the chi-squared distribution with 3 degrees of freedom, which the errors have if their covariance is correct.
+    The curve is the chi-squared distribution with 3 degrees of freedom, which the errors have if their covariance is correct.  `axes`: of
+    Matplotlib.
     """
     from scipy.special import chdtr
 
@@ -62,7 +63,10 @@ def finish_normalised(axes: Any) -> None:
 
 
 def ticks_at(axes: Any, places: Sequence[float], labels: Sequence[str] | None = None) -> None:
-    """Mark only the values `places` on the x axis, with `labels`; None: with the numbers themselves."""
+    """Mark only the values `places` on the x axis, with `labels`; None: with the numbers themselves.
+
+    `axes`: of Matplotlib.
+    """
     axes.set_xticks(places, [f"{place:g}" for place in places] if labels is None else labels)
     axes.minorticks_off()
 
@@ -70,7 +74,8 @@ def ticks_at(axes: Any, places: Sequence[float], labels: Sequence[str] | None = 
 def draw_curve(axes: Any, at: ArrayLike, runs: Array, color: str, label: str) -> None:
     """Draw the interquartile means of N runs at L places of the x axis as a line, and their 95 % bootstrap intervals as a band.
 
-    `at`: (L,) x values.  `runs`: (N, L), a row for each run.
+    `at`: (L,) x values.  `runs`: (N, L), a row for each run.  `axes`: of Matplotlib.  `color`: of line and band.  `label`: of the line in
+    the legend.
     """
     draw_band(axes, at, list(runs.T), "o-", color=color, label=label, markersize=4)
 
@@ -90,6 +95,7 @@ def draw_bars(axes: Any, at: ArrayLike, groups: Sequence[Array], width: float, c
     """Draw the interquartile mean of each group of runs as a bar, and its 95 % bootstrap interval as a whisker.
 
     `at`: x value of each group.  `groups`: the numbers of the runs of each group.  `width`: width of a bar, in units of the x axis.
+    `axes`: of Matplotlib.  `color`: of the bars.  `label`: of the bars in the legend.
     """
     means, low, high = _of(groups)
     spread = np.maximum([means - low, high - means], 0.0)  # an interval need not hold the mean
@@ -107,9 +113,9 @@ def draw_points(axes: Any, at: ArrayLike | Sequence[str], groups: Sequence[Array
 
 
 def draw_heights(axes: Any, values: ArrayLike, **style: Any) -> None:
-    """Draw many numbers as adjacent bars at x = 0, 1, ... in one patch, because thousands of separate rectangles take seconds.
+    """Draw many numbers (`values`) as adjacent bars at x = 0, 1, ... in one patch, because thousands of separate rectangles take seconds.
 
-    `style`: passed to `axes.stairs`.
+    `style`: passed to `axes.stairs`.  `axes`: of Matplotlib.
     """
     axes.stairs(values, np.arange(np.size(values) + 1) - 0.5, fill=True, **style)
 
@@ -117,7 +123,7 @@ def draw_heights(axes: Any, values: ArrayLike, **style: Any) -> None:
 def draw_stacked_bars(axes: Any, runs: Sequence[Array]) -> Array:
     """Draw the numbers of several runs as stacked bars at x = 0, 1, ..., with a colour for each run; returns the total heights (L,).
 
-    `runs`: L numbers of each run.
+    `runs`: L numbers of each run.  `axes`: of Matplotlib.
     """
     heights = np.zeros(len(runs[0]))
     for run in runs:

@@ -54,10 +54,10 @@ class Example:
 
     `title`, `figure`: of the pictures, and number of the figure in the thesis.  `costs`: terms that every pose must satisfy.  `task`: the
     task space.  `spacing`: distance between vertices, in the units of the task coordinates.  `motors`: names of the moving motors or parts.
-    `start`: (n,) rad, start of the search and posture of all other motors; None: home.  `markers`: markers whose positions are drawn for
-    every vertex.  `via`: task coordinates through which the motion of the filmstrip passes, in order.  `views`: camera views of the
-    filmstrip.  `margin`: distance of the motors from their limits [rad]; with MARGIN (10 degrees) the control law lets the robot rest in
-    every pose.
+    `start`: (n,) rad, a posture of all motors: start of the search, and where the motors that do not move stay; None: home.  `markers`:
+    markers whose positions are drawn for every vertex.  `via`: task coordinates through which the motion of the filmstrip passes, in order.
+    `views`: camera views of the filmstrip.  `margin`: distance of the motors from their limits [rad]; with MARGIN (10 degrees) the default
+    control law, which pushes motors away from their limits, exerts no such force in any pose of the roadmap.
     """
 
     title: str
@@ -75,17 +75,27 @@ class Example:
 
 
 def one_hand(model: Model, title: str, figure: str, terms: Sequence[Term], task: Task, spacing: float, **more: Any) -> Example:
-    """Return an example in which torso and right arm move, the left arm is bent aside, and the law lets the robot rest in every pose.
+    """Return an example in which torso and right arm move, and the left arm is bent aside.
 
-    `terms`: costs besides those of contacts and of the distance from home, which every example has.  `more`: other fields of `Example`.
+    The motors stay at least 10 degrees (MARGIN) away from their limits, because nearer to a limit the default control law pushes them away
+    from it, so that the robot cannot rest there.
+
+    `title`, `figure`: of the pictures, and number of the figure in the thesis.  `terms`: costs besides those of contacts and of the
+    distance from home, which every example has.  `task`: the task space.  `spacing`: distance between vertices, in the units of the task
+    coordinates.  `more`: other fields of `Example`, which replace the values above.
     """
     return _example(model, title, figure, terms, task, spacing, {"motors": ONE_HAND, "start": left_aside(model.robot)} | more)
 
 
 def both_hands(model: Model, title: str, figure: str, terms: Sequence[Term], task: Task, spacing: float, **more: Any) -> Example:
-    """Return an example in which torso and both arms move, and the law lets the robot rest in every pose.
+    """Return an example in which torso and both arms move.
 
-    `terms`: costs besides those of contacts and of the distance from home, which every example has.  `more`: other fields of `Example`.
+    The motors stay at least 10 degrees (MARGIN) away from their limits, because nearer to a limit the default control law pushes them away
+    from it, so that the robot cannot rest there.
+
+    `title`, `figure`: of the pictures, and number of the figure in the thesis.  `terms`: costs besides those of contacts and of the
+    distance from home, which every example has.  `task`: the task space.  `spacing`: distance between vertices, in the units of the task
+    coordinates.  `more`: other fields of `Example`, which replace the values above.
     """
     return _example(model, title, figure, terms, task, spacing, {"motors": BOTH_HANDS, "markers": (LEFT, RIGHT)} | more)
 

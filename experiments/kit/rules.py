@@ -44,7 +44,7 @@ def row(runs: Sequence[Run], columns: Mapping[str, Callable[[Run], float]]) -> d
 
 
 def of_each(groups: Mapping[Key, Iterable[Run]], number: Callable[[Run], float]) -> dict[Key, list[float]]:
-    """Return for each group the list of the numbers that the function `number` computes from its runs, by the group's key."""
+    """Return a dict from the key of each group to the list of the numbers that the function `number` computes from its runs."""
     return {key: [number(run) for run in runs] for key, runs in groups.items()}
 
 
@@ -60,7 +60,7 @@ def texts(values: Mapping[Any, ArrayLike], digits: int = 2, form: str = "{} {}")
 
 
 def decides(span: tuple[float, float], least: float = -np.inf, most: float = np.inf) -> bool | None:
-    """Return True for an interval (low, high) within [least, most], False for one outside, None for one that contains a bound."""
+    """Return True for an interval `span` (low, high) within [least, most], False for one outside, None for one that contains a bound."""
     low, high = span
     if low >= least and high <= most:
         return True
@@ -108,6 +108,7 @@ def equivalent(first: ArrayLike, second: ArrayLike, margin: float) -> bool | Non
     """Return whether the interquartile means of two groups differ by less than `margin`, by the interval of their difference.
 
     True if the whole interval lies within [-margin, margin] (two one-sided tests), False if it lies outside, None if it contains a bound.
+    `first`, `second`: the numbers of the two groups.
     """
     return decides(difference_interval(first, second), -margin, margin)
 
@@ -142,7 +143,7 @@ def better(values: Mapping[str, ArrayLike], name: str, rivals: Sequence[str], wo
 
     `values`: the numbers of the runs of each group, by its key.  The runs are above a rival's if the interval of the probability of
     improvement lies above one half.  They are not above if this interval lies below one half, or if both groups are equivalent: the
-    interval of the ratio of their means lies within 0.9 to 1.1.
+    interval of the ratio of their means lies within 0.9 to 1.1.  `digits`: decimals in the text.
     """
     parts, verdicts = [f"{name} {estimate(values[name], digits)}"], list[bool | None]()
     for rival in rivals:

@@ -176,7 +176,8 @@ def ratio(above: ArrayLike, below: ArrayLike) -> float:
 def ratio_interval(above: ArrayLike, below: ArrayLike, level: float | None = None) -> tuple[float, float]:
     """Return the bootstrap interval (low, high) of `ratio`; both groups are resampled.
 
-    `level`: confidence level, 0 to 1; None: that of the intervals that decide, 0.95 unless `error_rate` tries another one.
+    `level`: confidence level, 0 to 1; None: that of the intervals that decide, 0.95 unless `error_rate` tries another one.  `above`,
+    `below`: the numbers of the two groups, above and below the fraction bar.
     """
     return _of_both(above, below, _ratios, level)
 
@@ -199,7 +200,10 @@ def _differences(first: Array, second: Array) -> Array:
 
 
 def ratio_estimate(above: ArrayLike, below: ArrayLike, digits: int = 2) -> str:
-    """Return the `ratio` of two groups and its 95 % interval as text, as "1.50 [1.20, 1.90]"; `digits`: decimals."""
+    """Return the `ratio` of two groups and its 95 % interval as text, as "1.50 [1.20, 1.90]"; `digits`: decimals.
+
+    `above`, `below`: the numbers of the two groups, above and below the fraction bar.
+    """
     low, high = ratio_interval(above, below, LEVEL)
     return f"{ratio(above, below):.{digits}f} [{low:.{digits}f}, {high:.{digits}f}]"
 
@@ -212,7 +216,8 @@ def probability_of_improvement(first: ArrayLike, second: ArrayLike) -> float:
 def improvement_interval(first: ArrayLike, second: ArrayLike, level: float | None = None) -> tuple[float, float]:
     """Return the bootstrap interval (low, high) of `probability_of_improvement`; both groups are resampled.
 
-    `level`: confidence level, 0 to 1; None: that of the intervals that decide, 0.95 unless `error_rate` tries another one.
+    `level`: confidence level, 0 to 1; None: that of the intervals that decide, 0.95 unless `error_rate` tries another one.  `first`,
+    `second`: the numbers of the two groups.
     """
     return _of_both(first, second, _improvements, level)
 
@@ -255,13 +260,13 @@ def share_interval(successes: int, tries: int, level: float | None = None) -> tu
 
 
 def relative_spread(counts: ArrayLike) -> float:
-    """Return the standard deviation of the numbers divided by their mean; 0 if all numbers are equal."""
+    """Return the standard deviation of the numbers `counts` divided by their mean; 0 if all numbers are equal."""
     given = np.asarray(counts, dtype=np.float64)
     return float(given.std() / given.mean())
 
 
 def gini(counts: ArrayLike) -> float:
-    """Return the Gini coefficient of n numbers >= 0: 0 if all are equal, 1 - 1/n if all but one are 0."""
+    """Return the Gini coefficient of `counts`, n numbers >= 0: 0 if all are equal, 1 - 1/n if all but one are 0."""
     ordered = np.sort(np.asarray(counts, dtype=np.float64))
     ranks = np.arange(1, len(ordered) + 1)
     return float(2.0 * (ranks * ordered).sum() / (len(ordered) * ordered.sum()) - (len(ordered) + 1) / len(ordered))

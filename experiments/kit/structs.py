@@ -14,7 +14,7 @@ T = TypeVar("T")
 def encoded(record: Any, indent: int | None = None) -> str:
     """Return a msgspec Struct, or a list of Structs, as JSON text; numbers that are not finite are written as Infinity, -Infinity or NaN.
 
-    `indent`: spaces for each level; None: all in one line.
+    `indent`: spaces for each level; None: all in one line.  `record`: the Struct or list.
     """
     return json.dumps(msgspec.to_builtins(record), indent=indent)
 

@@ -196,8 +196,8 @@ class Room:
         The contacts are two arrays: numbers (c, 6) and reals (c, 7), the columns of `mobee.model.contact.ContactTable`. The projection is
         the sum of J^T (depth * normal) over the contacts of fields, volumes that cause repulsive forces; J is the Jacobian of the contact's
         point. `scene`: handle of the scene. `hands`: the reaching hands as four link indices (`mobee.model.snapshot.hand_numbers`); their
-        contacts with targets are ignored. `cut`: True: a contact acts only on the motors of the part that touches, as in the program of
-        2014; False: also on the motors nearer to the base. `threads`: number of threads.
+        contacts with targets are ignored. `cut`: True: a contact acts only on the motors of the part that touches, as in the MoBeE program
+        of 2014; False: also on the motors nearer to the base. `threads`: number of threads.
         """
         torque = np.empty(q.shape)
         request = _Request(scene.at, address(q), address(torque), len(q), cut, threads, (INTEGER * 4)(*hands))

@@ -75,7 +75,7 @@ class Assist:
         self._postures = np.stack(np.meshgrid(*compared, indexing="ij"), axis=-1).reshape(-1, len(compared))
 
     def posture(self, q: Array, target: Array) -> Assistance:
-        """Return the best posture of the part for a target (3,) m, root frame; all other motors stay at q (n,) rad.
+        """Return the best posture of the part for a target (3,) m, root frame; all other motors stay as in the posture q (n,) rad.
 
         The score of a posture is the worth of the target for the arm (at most 1), minus 0.1 per rad^2 of motion. The part stays at its
         present posture if no posture without contacts of solids has a score that is better by more than 0.05.
@@ -111,7 +111,7 @@ def learned_worth(predictor: RewardPredictor) -> Worth:
 
 
 def manipulability_worth(robot: Robot, arm: str, marker: str, seed: int = 0) -> Worth:
-    """Return a function of places (k, 3) m: the arm's manipulability sqrt(det J J^T) near each place, relative to the largest, (k,).
+    """Return a function of places (k, 3) m: the arm's manipulability sqrt(det J J^T) near each place, as a share of its maximum, (k,).
 
     Unlike `learned_worth` it needs no learner. The manipulability is computed in random postures; postures in which the robot touches
     itself are ignored. For a place that is not near to the marker in any posture, the value is minus the distance [m] from the nearest

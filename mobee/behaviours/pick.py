@@ -115,7 +115,7 @@ class NoPosture(MobeeError):
 
 
 def azimuth_beside(place: Array) -> float:
-    """Return a suitable azimuth [rad] of the iCub's right palm beside a thing at (2,) m, x and y in the root frame.
+    """Return a suitable azimuth [rad] of the iCub's right palm beside a thing at `place` (2,) m, x and y in the root frame.
 
     The azimuth is the direction that the palm faces: 0: the left (-y), pi / 2: the front (-x). For things farther right the palm is turned
     more to the front.
@@ -215,7 +215,7 @@ class Picker:
         return aim
 
     def move(self, path: Array, speed: float, watch: BumpWatch | None = None) -> bool:
-        """Move along a path (K, n) rad, with an attractor that cancels the law's forces; return whether the robot bumped into something.
+        """Move along a path (K, n) rad, with an attractor that cancels the control law's forces; return whether the robot hit something.
 
         `speed`: share of the largest speed. `watch`: detects bumps; at a bump the robot moves back a little and the motion ends; None:
         bumps are not detected.

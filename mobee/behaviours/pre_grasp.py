@@ -110,7 +110,7 @@ class MapPlanner:
         self._palms = trm.model.evaluate(trm.q).position(marker)
 
     def path(self, start: Array, goal: Array, azimuth: float, blocked: Array) -> Array | None:
-        """Return a path (K, n) rad from `start` (n,) rad through the map to `goal` (n,) rad, or None if there is no path.
+        """Return a path (K, n) rad from `start` (n,) rad through the roadmap to `goal` (n,) rad, or None if there is no path.
 
         `azimuth`: direction that the palm faces in `goal` [rad]. `blocked`: (B, 3) m, positions of the palm at earlier bumps, root frame;
         the palm moves around or over them.

@@ -90,10 +90,10 @@ def check_file(
 ) -> Checked:
     """Check a shipped robot or world, or a robot or world file; return its content and all findings, errors first.
 
-    `world`: a world; the objects that the robot touches in it at home are reported too. The other arguments are options for reading a URDF
-    or MJCF file, as in `mobee.robot.load.load_robot`: the width of fields [m], "hull" or "bounding" shapes for meshes, the largest number
-    of corners of a hull, the SRDF file, and the home pose. Raises RobotFileError, UnknownName or InvalidValue if the file cannot be read,
-    or if an option is not valid for the file.
+    `name_or_path`: name of a shipped robot or world, or path of a file. `world`: a world; the objects that the robot touches in it at home
+    are reported too. The other arguments are options for reading a URDF or MJCF file, as in `mobee.robot.load.load_robot`: the width of
+    fields [m], "hull" or "bounding" shapes for meshes, the largest number of corners of a hull, the SRDF file, and the home pose. Raises
+    RobotFileError, UnknownName or InvalidValue if the file cannot be read, or if an option is not valid for the file.
     """
     _require_known(name_or_path)
     path = world_file(name_or_path)
@@ -135,7 +135,7 @@ def _require_known(name_or_path: str | Path) -> None:
 
 
 def world_file(name_or_path: str | Path) -> Path | None:
-    """Return the path of the file of a shipped world or of a world file; None for a robot, and if there is no such file."""
+    """Return the path of a world file, given its path or the name of a shipped world; None for a robot, and if there is no such file."""
     given, path = str(name_or_path), Path(name_or_path)
     if given in shipped_worlds() and given not in shipped_robots():
         return WORLDS / f"{given}.xml"

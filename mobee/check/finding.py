@@ -61,7 +61,7 @@ def _in_metres(robot: Robot, motor: Motor) -> bool:
 
 
 def length(metres: float) -> str:
-    """Return a length as text for a message, in mm if it is below 0.1 m, else in m."""
+    """Return a length [m] as text for a message, in mm if it is below 0.1 m, else in m."""
     return f"{1e3 * metres:.3g} mm" if metres < 0.1 else f"{metres:.3g} m"
 
 

@@ -113,7 +113,7 @@ class Controller:
 
     @property
     def velocity(self) -> Array:
-        """The velocity q' of the law's own state, shape (n,), in [rad/s]; a copy. It is not measured."""
+        """The velocity q' of the control law's own state, shape (n,), in [rad/s]; a copy. It is not measured."""
         own: Array = self._state["velocity"].copy()
         return own
 
@@ -125,7 +125,7 @@ class Controller:
 
     @property
     def state(self) -> Table:
-        """The state of the law: a table with one row for each motor, always the same array.
+        """The state of the control law: a table with one row for each motor, always the same array.
 
         Its columns are those of `mobee._core.law.STATE`: velocity, acceleration, position reference and others. The law and the plants
         change it in place.
@@ -184,8 +184,8 @@ class Controller:
 
         The damping of eq. 5.7 then acts on the velocity relative to the goal, C (q' - q*'), so that the part follows without a lag. If
         other forces push a motor against the goal's velocity, the motor follows less; if they are 0.25 rad/s^2 or more, only the spring of
-        the attractor pulls the motor. Call this at least every FOLLOW_TIME (0.1 s of the law's time); later the goal counts as not moving.
-        Raises UnknownName for an unknown part, InvalidValue for a wrong shape or numbers that are not finite.
+        the attractor pulls the motor. Call this at least every FOLLOW_TIME (0.1 s of the control law's time); later the goal counts as not
+        moving. Raises UnknownName for an unknown part, InvalidValue for a wrong shape or numbers that are not finite.
 
         Args:
             part: name of the part.
@@ -245,7 +245,7 @@ class Controller:
         return self._reaches.is_approaching(part)
 
     def reset(self, q: Array) -> None:
-        """Set the law to rest at the measured q (n,) rad: own velocity 0, attractor and position reference at q.
+        """Set the control law to rest at the measured q (n,) rad: own velocity 0, attractor and position reference at q.
 
         Forces of clients and reaches continue.
         """
@@ -273,14 +273,14 @@ class Controller:
         self._state[where] = self.law.at_rest(self._attractor)[where]
 
     def forces(self, pose: Pose) -> Forces:
-        """Return the constraint forces of the law at a pose, for the present state of the law.
+        """Return the constraint forces of the control law at a pose, for the present state of the law.
 
         The forces of user-defined terms are not included; `own_forces` returns them. Raises InvalidValue for a batch of poses.
         """
         return forces_of(self.law, pose, self.propagate, self._state)
 
     def own_forces(self, q: Array, dt: float, pose: Pose | None = None, reaching: Reaching = None) -> dict[str, Array]:
-        """Return the forces of the user-defined `terms` by name, each (n,) rad/s^2, at the measured q (n,) rad in a tick of dt [s].
+        """Return a dict from the name of each user-defined term to its force, (n,) rad/s^2, at the measured q (n,) rad in a tick of dt [s].
 
         `pose`: the robot at q; None: evaluated when a term reads it. `reaching`: the markers that reach in this pose; contacts of their
         hands with targets are ignored. Raises InvalidValue, with the name of the term, if a term fails.
@@ -294,7 +294,7 @@ class Controller:
         return found
 
     def step(self, q: Array, dt: float, forces: Forces | None = None, pose: Pose | None = None) -> Command:
-        """Advance the law by dt [s] from the measured q (n,) rad and return the command (thesis eq. 5.7).
+        """Advance the control law by dt [s] from the measured q (n,) rad and return the command (thesis eq. 5.7).
 
         `forces`: the constraint forces at q; None: computed from `pose`, the robot at q; without a pose the model evaluates q. Forces that
         depend on the law's state, and the forces of `terms`, are computed if `forces` does not contain them. Raises InvalidValue for a dt

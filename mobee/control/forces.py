@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The constraint forces of the law by name, as the model publishes them in every tick, and checks of force values."""
+"""The constraint forces of the control law by name, as the model publishes them in every tick, and checks of force values."""
 
 from __future__ import annotations
 
@@ -31,17 +31,17 @@ LARGEST_FORCE = 1e9  # rad/s^2, or N/kg at a marker: far above what any squash l
 class Forces(Mapping[str, Array]):
     """The constraint forces by name, each (n,) in rad/s^2 (force per unit mass), already bounded.
 
-    First are the forces of the law, in the order in which they are added: `limits`, `constraints` and `collision`, which are f_lim, f_cst
-    and f_coll of thesis eq. 5.7. Then come the forces of user-defined terms. A force can also be read as an attribute: `forces.limits`.
-    The forces `limits`, `constraints` and `collision` depend only on the pose. If somebody has extended the compiled core by
-    forces that depend on the state of the law, such as its velocity, such forces may be missing.
+    First are the forces of the control law, in the order in which they are added: `limits`, `constraints` and `collision`, which are f_lim,
+    f_cst and f_coll of thesis eq. 5.7. Then come the forces of user-defined terms. A force can also be read as an attribute:
+    `forces.limits`. The forces `limits`, `constraints` and `collision` depend only on the pose. If somebody has extended the compiled core
+    by forces that depend on the state of the law, such as its velocity, such forces may be missing.
     """
 
     __slots__ = ("_rows",)
     __eq__, __hash__ = object.__eq__, object.__hash__  # arrays are not compared
 
     def __init__(self, *rows: Array, **more: Array) -> None:
-        """Store forces of the law in their order (`rows`) or by name (`more`), and those of user-defined terms by name (`more`).
+        """Store forces of the control law in their order (`rows`) or by name (`more`), and those of user-defined terms by name (`more`).
 
         Raises InvalidValue if a force that depends on the pose only is missing, or if one is given twice.
         """
@@ -81,7 +81,7 @@ class Forces(Mapping[str, Array]):
 
 
 def published_terms() -> tuple[str, ...]:
-    """Return the names of the law's forces that depend on the pose only.
+    """Return the names of the control law's forces that depend on the pose only.
 
     In the live system the model service computes and publishes these forces, and the controller service computes all others.
     """
@@ -89,7 +89,7 @@ def published_terms() -> tuple[str, ...]:
 
 
 def needs_contacts() -> bool:
-    """Return whether some forces of the law depend on the law's state, such as its velocity.
+    """Return whether some forces of the control law depend on the law's state, such as its velocity.
 
     In the live system the model service then publishes all contacts too, so that the controller service can compute such forces.
     """

@@ -72,7 +72,7 @@ class Law:
         """Return the constraint forces at q (n,) rad: rows f_lim, f_cst, f_coll, (len(term_names()), n) rad/s^2 (thesis eqs. 5.11 to 5.17).
 
         `torque` (n,): the sum over all contacts of J^T times depth times normal, m^2/rad, from `Pose.projection` or
-        `Pose.projection_of_part`. `state`: the state of the law before the step; None: at rest.
+        `Pose.projection_of_part`. `state`: the state of the control law before the step; None: at rest.
         """
         found = np.empty((len(core.term_names()), len(self)))
         given = numbers(q, len(self)), numbers(torque, len(self)), address(self._still if state is None else state)
@@ -80,7 +80,7 @@ class Law:
         return found
 
     def at_rest(self, q: Array) -> Table:
-        """Return the state of the law at rest at the measured q (n,) rad, with the columns of `mobee._core.law.STATE`."""
+        """Return the state of the control law at rest at the measured q (n,) rad, with the columns of `mobee._core.law.STATE`."""
         state: Table = np.zeros(len(self), dtype=core.STATE)
         state["reference"] = np.clip(q, self.motors["low"], self.motors["high"])
         state["reference"][self.active] = q[self.active]

@@ -85,7 +85,7 @@ class Watch:
     """Checks poses for violations: contacts, motors beyond their limits, and clauses (constraints on several joints) that do not hold."""
 
     def __init__(self, robot: Robot, kinds: Sequence[ContactKind] = KINDS, tolerance: float = TOLERANCE) -> None:
-        """Prepare the checks for a robot; raises InvalidValue.
+        """Prepare the checks for a robot; raises InvalidValue for an argument that is not valid.
 
         `kinds`: kinds of contacts that count as violations, of "solid" and "field". `tolerance`: rad, how far a pose may be beyond a limit
         or a clause without a violation, because encoders are noisy; for a motor that slides it is multiplied by its
@@ -166,7 +166,7 @@ class Debounce:
         self.on = False
 
     def update(self, raw: bool) -> bool:
-        """Process the input of one tick; return the output of the filter."""
+        """Process `raw`, the input of one tick; return the output of the filter."""
         self._ticks = self._ticks + 1 if raw != self.on else 0
         if self._ticks >= self._needed[raw]:
             self.on, self._ticks = raw, 0
@@ -184,7 +184,7 @@ class Reflex:
     """
 
     def __init__(self, settings: ReflexSettings, dt: float, max_velocity: Array) -> None:
-        """Start in state "forward" without recorded poses; raises InvalidValue.
+        """Start in state "forward" without recorded poses; raises InvalidValue for an argument that is not valid.
 
         `dt`: duration of a tick [s]. `max_velocity`: (n,) rad/s, largest velocity of the target while it retraces poses.
         """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The largest time step at which the law is stable."""
+"""The largest time step at which the control law is stable."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ class Bound:
 
 
 def largest_step(robot: Robot, gains: Gains) -> float:
-    """Return the bound of the time step [s], infinite if no motor moves: the semi-implicit Euler step of the law is stable below it."""
+    """Return the time step [s] below which the semi-implicit Euler step of the control law is stable; infinite if no motor moves."""
     return stability_bound(robot, gains).step
 
 
 def require_stable(robot: Robot, gains: Gains, dt: float) -> None:
-    """Raise InvalidValue, with the motor and the violated bound, if the law is unstable at steps of dt [s], or if dt is not valid."""
+    """Raise InvalidValue, with motor and violated bound, if the control law is unstable at steps of dt [s], or if dt is not valid."""
     if not (dt > 0 and np.isfinite(dt)):
         raise InvalidValue(f"time step {dt} s: must be a finite time above 0")
     bound = stability_bound(robot, gains)

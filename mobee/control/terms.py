@@ -23,8 +23,8 @@ _NAME = re.compile("[a-z][a-z0-9_]{0,63}")
 class State:
     """The input of a user-defined force in one tick; arrays are read-only.
 
-    `q`: (n,) rad, measured positions. `velocity`: (n,) rad/s, the law's own velocity. `dt`: s, duration of the tick. `robot`: the robot.
-    `pose`: the robot at q in its world.
+    `q`: (n,) rad, measured positions. `velocity`: (n,) rad/s, the control law's own velocity. `dt`: s, duration of the tick. `robot`: the
+    robot. `pose`: the robot at q in its world.
     """
 
     __slots__ = ("_evaluate", "_pose", "dt", "q", "robot", "velocity")
@@ -46,8 +46,8 @@ class State:
 class Term:
     """A user-defined force, added on the right-hand side of thesis eq. 5.7.
 
-    `name`: of a-z, 0-9 and _, a letter first, different from the names of the law's forces. `function`: takes a `State` and returns the
-    force on the motors, (n,) rad/s^2, or m/s^2 for a motor that slides. It is called in every tick.
+    `name`: of a-z, 0-9 and _, a letter first, different from the names of the control law's forces. `function`: takes a `State` and returns
+    the force on the motors, (n,) rad/s^2, or m/s^2 for a motor that slides. It is called in every tick.
     """
 
     name: str
@@ -81,7 +81,7 @@ def _kept(array: Array) -> Array:
 def valid_terms(given: Sequence[Term]) -> tuple[Term, ...]:
     """Return the given terms as a tuple.
 
-    Raises InvalidValue if two names are equal, or if one is a name of the law's forces or of an attribute of `Forces`.
+    Raises InvalidValue if two names are equal, or if one is a name of the control law's forces or of an attribute of `Forces`.
     """
     terms, taken = tuple(given), set(term_names())
     for term in terms:

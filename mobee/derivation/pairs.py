@@ -45,7 +45,10 @@ def without_links(robot: Robot, pairs: Collection[LinkPair], reason: str) -> Rob
 
 
 def often_touching(robot: Robot, seed: int, share: float = OFTEN) -> set[LinkPair]:
-    """Return the pairs of links (indices) of which two solids touch in more than the fraction `share` of random poses."""
+    """Return the pairs of links (indices) of which two solids touch in more than the fraction `share` of random poses.
+
+    `seed`: of the poses.
+    """
     counts = _counted(replace(robot, field_pairs=robot.field_pairs[:0]), seed)
     links: Counter[LinkPair] = Counter()
     for (first, second), count in counts.items():

@@ -70,7 +70,10 @@ class EnvPlant(InstantPlant):
         return self.space.target(self._state)
 
     def measure(self, part: str) -> Array:
-        """Return the number of the last observed state in the form of two motor positions, shape (2,); the second number is always 0."""
+        """Return the number of the last observed state in the form of two motor positions, shape (2,); the second number is always 0.
+
+        `part`: must be `space.part`, else UnknownName is raised.
+        """
         self._check_part(part)
         return self.q
 

@@ -205,9 +205,9 @@ class ReachEnv(Env[Any, Any]):
         return seen, float(reward), False, False, {"is_success": bool(reached), "solid_depth": float(solid), "field_depth": float(field)}
 
     def compute_reward(self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: Any = None) -> Any:
-        """Return the rewards (...) for achieved and desired positions (..., 3) m, as hindsight experience replay needs them.
+        """Return the rewards (...) for reached positions and targets, (..., 3) m each, as hindsight experience replay needs them.
 
-        `info` is not used.
+        `achieved_goal`: positions of the marker. `desired_goal`: positions of the target. `info`: not used.
         """
         return self._reaching.judge(np.asarray(achieved_goal), np.asarray(desired_goal))[0]
 

@@ -46,7 +46,7 @@ class TabularEnv(Env[Any, Any]):
 
 
 def river_swim_env(length: int = 6, render_mode: None = None) -> TabularEnv:
-    """Return the world of `mobee.learning.tabular.river_swim` as an environment whose episodes never end.
+    """Return the world of `mobee.learning.tabular.river_swim`, with `length` states, as an environment whose episodes never end.
 
     Made by its id, `MoBeE/RiverSwim-v0`, it truncates an episode after 200 steps.
     """

@@ -60,10 +60,10 @@ class SampledBeliefs:
 
 
 def posterior_sampling(agent: Explorable, state: int, rng: np.random.Generator) -> Array:
-    """Score actions by the discounted information gain in a transition model drawn from the posterior (Strens 2000).
+    """Score the actions of a state by the discounted information gain in a transition model drawn from the posterior (Strens 2000).
 
     The random numbers of the draw stay the same for 1 / (1 - discount) transitions. During this time the drawn model changes only because
-    the counts change.
+    the counts change. `rng`: not used.
     """
     model = agent.model
     episode = agent.transitions // round(1.0 / (1.0 - agent.discount))
@@ -146,12 +146,15 @@ TIE_MARGIN = 1e-12  # scores that differ by less are a tie
 
 
 def curious(agent: Explorable, state: int, rng: np.random.Generator) -> Array:
-    """Score actions by the discounted sum of rewards in a plan for information gain, or for the agent's goal (thesis Algorithm 8)."""
+    """Score actions by the discounted sum of rewards in a plan for information gain, or for the agent's goal (thesis Algorithm 8).
+
+    Scored are the actions of `state`; `rng` is not used.
+    """
     return agent.plan()[1][state, : len(agent.model.space.actions(state))]
 
 
 def random(agent: Explorable, state: int, rng: np.random.Generator) -> Array:
-    """Score all actions equally, so that each is taken with the same probability."""
+    """Score all actions of a state equally, so that each is taken with the same probability."""
     return np.zeros(len(agent.model.space.actions(state)))
 
 

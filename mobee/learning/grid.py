@@ -50,7 +50,7 @@ class Grid:
         return f"<Grid of {self.shape[0]} x {self.shape[1]} cells, {self._size[0]:.3g} x {self._size[1]:.3g} m each>"
 
     def cell_of(self, place: ArrayLike, before: int | None = None) -> int:
-        """Return the cell that contains a position, (2,) or (3,) m in the root frame; outside the grid, the nearest cell.
+        """Return the cell that contains the position `place`, (2,) or (3,) m in the root frame; outside the grid, the nearest cell.
 
         `before`: the present cell, which is returned if the position is at most `margin` beyond its border; None: no cell is preferred.
         Raises InvalidValue for numbers that are not finite, or if there is no cell `before`.

@@ -25,10 +25,16 @@ class InstantPlant(ABC):
 
     @abstractmethod
     def act(self, part: str, target: Array) -> Outcome:
-        """Perform the action whose target `space.aim` returned, and return its outcome; the action counts as 1 s."""
+        """Perform the action whose target `space.aim` returned, and return its outcome; the action counts as 1 s.
+
+        `part`: must be `space.part`.
+        """
 
     def begin(self, part: str, target: Array) -> None:
-        """Store the target of an action, from `space.aim`; `advance` performs it. Raises InvalidValue if an action is under way."""
+        """Store the target of an action, from `space.aim`; `advance` performs it. Raises InvalidValue if an action is under way.
+
+        `part`: must be `space.part`, else UnknownName is raised.
+        """
         self._check_part(part)
         if self._under_way is not None:
             raise InvalidValue(f"{part} has an action under way: wait for it with advance().")

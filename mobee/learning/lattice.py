@@ -135,9 +135,9 @@ def plane_layout(space: Space) -> Array:
     """Compute positions in a plane at which to draw the states, shape (S, 2).
 
     A lattice becomes a grid of blocks, as in figure 7 of the article in Frontiers in Neurorobotics 7:25 (2014): within a block the first
-    joint increases to the right and the second upwards; the third joint chooses the column of the block, the fourth its row, and so on. For
-    an `ObjectSpace` each cell of the object has a block with all postures. Other spaces are projected to the two directions in which the
-    samples differ most.
+    joint increases to the right and the second upwards; the third joint chooses the column of the block, the fourth its row, and so on. A
+    state of an `ObjectSpace` is a posture and a cell of a grid in which an object can be: each cell of the grid becomes a block, which
+    contains all postures. In any other space the samples (one posture for each state) are projected to their two principal components.
     """
     if isinstance(space, Lattice):
         return _nested([len(levels) for levels in space.levels])

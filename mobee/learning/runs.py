@@ -53,14 +53,14 @@ class OutcomeRuns:
         self._runs: dict[tuple[int, int], Runs] = {}
 
     def counts(self, state: int, action: int, bins: int) -> Array:
-        """Return the expected number of each of the action's outcomes since the last change, shape (bins,). `bins`: number of outcomes."""
+        """Return the expected number of each outcome of an action in a state since the last change, (bins,). `bins`: number of outcomes."""
         runs = self._of(state, action, bins)
         return self._expected(runs, self._hazard)
 
     def following(self, state: int, action: int, chosen: int, bins: int) -> Array:
         """Return the expected numbers, as `counts` returns them, after one more outcome with the index `chosen`, (bins,).
 
-        Nothing is changed. `bins`: number of outcomes of the action.
+        Nothing is changed. `bins`: number of outcomes of `action` in `state`.
         """
         runs, evidence = self._after(self._of(state, action, bins), chosen)
         return self._expected(runs, self._informed(evidence))

@@ -136,7 +136,7 @@ class Space:
         return pose
 
     def aim(self, state: int, action: int) -> Array:
-        """Return the target of an action for a plant, shape (n_part,), in [rad]: the sample of the action's goal."""
+        """Return the target of an action of a state for a plant, shape (n_part,), in [rad]: the sample of the action's goal."""
         return self.target(self.goal(state, action))
 
     @property

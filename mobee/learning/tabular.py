@@ -90,7 +90,7 @@ class TabularPlant(InstantPlant):
     def act(self, part: str, target: Array) -> Outcome:
         """Draw the outcome of the action of the present state that aims at `target` (n_part,) rad; an action counts as 1 s.
 
-        Raises InvalidValue if the state has no such action.
+        Raises InvalidValue if the state has no such action. `part`: must be the part of the space.
         """
         self._check_part(part)
         action = self._action_to(target)

@@ -54,7 +54,7 @@ Scalar = TypeVar("Scalar", bound=np.generic)
 
 
 def widened(array: NDArray[Scalar]) -> NDArray[Scalar]:
-    """Return a copy of a table with one more outcome (last axis), filled with 0."""
+    """Return a copy of an array (S, A, B) with one more outcome (last axis), filled with 0."""
     return np.pad(array, [(0, 0)] * (array.ndim - 1) + [(0, 1)])
 
 
@@ -296,7 +296,7 @@ class TransitionModel(Tabled):
         return self._debiased[goal, stay]
 
     def gain(self, state: int, action: int, outcome: int) -> float:
-        """Return the reward in nats that an observation of this outcome state would give now; nothing is changed."""
+        """Return the reward [nats] that a transition from `state` by `action` to the state `outcome` would give now; nothing is changed."""
         self._check(state, action, outcome)
         if self._runs is not None:
             return self._gain_since_change(int(state), int(action), int(outcome))

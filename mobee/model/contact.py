@@ -188,7 +188,7 @@ def touched_in(table: ContactTable, moved: frozenset[int]) -> tuple[str, ...]:
 
 @lru_cache(maxsize=8)
 def links_moved(robot: Robot) -> dict[str, frozenset[int]]:
-    """Return for every part, by name, the indices of the links that its motors move: the driven links and all links mounted on them."""
+    """Return a dict from every part to the indices of the links that its motors move: the driven links and all links mounted on them."""
     matrix, _ = robot.coupling
     found: dict[str, frozenset[int]] = {}
     for name, part in robot.parts.items():

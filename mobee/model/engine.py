@@ -87,8 +87,8 @@ class Engine:
 
         The projection is the sum of J^T (depth * normal) over the contacts of fields, volumes that cause repulsive forces; J is the
         Jacobian of the contact's point. `snapshot`: the state of the world. `reaching`: the hands that reach for targets; their contacts
-        with targets are ignored. `cut`: True: a contact acts only on the motors of the part that touches, as in the program of 2014; False:
-        also on the motors nearer to the base. The results are the same for any number of threads.
+        with targets are ignored. `cut`: True: a contact acts only on the motors of the part that touches, as in the MoBeE program of
+        2014; False: also on the motors nearer to the base. `threads`: number of threads; the results do not depend on it.
         """
         scene = self.scene_of(snapshot)
         try:
@@ -105,7 +105,7 @@ class Engine:
         The projection is the sum of J^T (depth * normal) over the contacts of fields, volumes that cause repulsive forces; J is the
         Jacobian of the contact's point. `q`: the pose (n,) rad as bytes of float64. `snapshot`: the state of the world. `reaching`: the
         hands that reach for targets; their contacts with targets are ignored. `cut`: True: a contact acts only on the motors of the part
-        that touches, as in the program of 2014; False: also on the motors nearer to the base.
+        that touches, as in the MoBeE program of 2014; False: also on the motors nearer to the base.
         """
         try:
             room = self._rooms.pop()  # atomic: other threads take buffers too

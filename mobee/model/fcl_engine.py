@@ -57,8 +57,8 @@ class FclEngine:
 
         The projection is the sum of J^T (depth * normal) over the contacts of fields, volumes that cause repulsive forces; J is the
         Jacobian of the contact's point. `snapshot`: the state of the world. `reaching`: the hands that reach for targets; their contacts
-        with targets are ignored. `cut`: True: a contact acts only on the motors of the part that touches, as in the program of 2014; False:
-        also on the motors nearer to the base. `threads` is ignored.
+        with targets are ignored. `cut`: True: a contact acts only on the motors of the part that touches, as in the MoBeE program of 2014;
+        False: also on the motors nearer to the base. `threads`: not used; the poses are computed one after the other.
         """
         transforms = link_transforms(self.robot, q)
         pairs = self._tested(snapshot, reaching)
@@ -76,7 +76,7 @@ class FclEngine:
         The projection is the sum of J^T (depth * normal) over the contacts of fields, volumes that cause repulsive forces; J is the
         Jacobian of the contact's point. `q`: the pose (n,) rad as bytes of float64. `snapshot`: the state of the world. `reaching`: the
         hands that reach for targets; their contacts with targets are ignored. `cut`: True: a contact acts only on the motors of the part
-        that touches, as in the program of 2014; False: also on the motors nearer to the base.
+        that touches, as in the MoBeE program of 2014; False: also on the motors nearer to the base.
         """
         table, torque = self.contacts(np.frombuffer(q)[None], snapshot, reaching, cut)
         return table, torque[0]

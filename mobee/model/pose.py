@@ -47,8 +47,8 @@ class Engine(Protocol):
 
         The projection is the sum of J^T (depth * normal) over the contacts of fields, volumes that cause repulsive forces; J is the
         Jacobian of the contact's point. `snapshot`: the state of the world. `reaching`: the hands that reach for targets; their contacts
-        with targets are ignored. `cut`: True: a contact acts only on the motors of the part that touches, as in the program of 2014; False:
-        also on the motors nearer to the base.
+        with targets are ignored. `cut`: True: a contact acts only on the motors of the part that touches, as in the MoBeE program of 2014;
+        False: also on the motors nearer to the base. `threads`: number of threads; the results do not depend on it.
         """
 
     def contacts_of_one(self, q: bytes, snapshot: Snapshot, reaching: Hands, cut: bool = False) -> tuple[ContactTable, Array]:
@@ -57,7 +57,7 @@ class Engine(Protocol):
         The projection is the sum of J^T (depth * normal) over the contacts of fields, volumes that cause repulsive forces; J is the
         Jacobian of the contact's point. `q`: the pose (n,) rad as bytes of float64. `snapshot`: the state of the world. `reaching`: the
         hands that reach for targets; their contacts with targets are ignored. `cut`: True: a contact acts only on the motors of the part
-        that touches, as in the program of 2014; False: also on the motors nearer to the base.
+        that touches, as in the MoBeE program of 2014; False: also on the motors nearer to the base.
         """
 
 
@@ -104,18 +104,18 @@ class Pose:
         return self._transforms
 
     def position(self, marker: str) -> Array:
-        """Return the position of a marker, (..., 3) m in the root frame; raises UnknownName."""
+        """Return the position of a marker, (..., 3) m in the root frame; raises UnknownName if there is no such marker."""
         m = self.robot.marker(marker)
         link = self.transforms[..., m.link, :3, :]
         return link[..., :3] @ m.position + link[..., 3]
 
     def rotation(self, marker: str) -> Array:
-        """Return the rotation of a marker, (..., 3, 3) in the root frame; raises UnknownName."""
+        """Return the rotation of a marker, (..., 3, 3) in the root frame; raises UnknownName if there is no such marker."""
         m = self.robot.marker(marker)
         return self.transforms[..., m.link, :3, :3] @ m.rotation
 
     def normal(self, marker: str) -> Array:
-        """Return the normal of a marker, (..., 3) unit vectors in the root frame; raises UnknownName."""
+        """Return the normal of a marker, (..., 3) unit vectors in the root frame; raises UnknownName if there is no such marker."""
         m = self.robot.marker(marker)
         return self.transforms[..., m.link, :3, :3] @ m.normal
 
@@ -152,7 +152,8 @@ class Pose:
         """The projection of the contacts to the motors, (..., n) m^2/rad, in which a push acts only on the motors of its link's own part.
 
         It is the sum of J^T (depth * normal) over the contacts of fields (volumes that cause repulsive forces), as `projection`, but a
-        contact of an arm, for example, does not act on the motors of the torso. The original program of 2014 projected contacts like this.
+        contact of an arm, for example, does not act on the motors of the torso. The original MoBeE program of 2014 projected contacts like
+        this.
         """
         return self._computed(True)[1]
 

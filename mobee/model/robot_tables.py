@@ -95,7 +95,7 @@ class RobotTables:
 def robot_tables(robot: Robot, carried: Sequence[Carried] = ()) -> RobotTables:
     """Return the core's tables of a robot, with the objects attached to its links as further shapes.
 
-    Raises InvalidValue if an index in the robot (parent of a joint, link of a shape or marker) is out of range.
+    Raises InvalidValue if an index in the robot (parent of a joint, link of a shape or marker) is out of range. `carried`: these objects.
     """
     _check(robot)
     rows, corner, edges = _rows(robot.shapes)

@@ -22,7 +22,7 @@ class Neighbours:
     """Computes the contacts of a robot in consecutive poses, with a list of the pairs of volumes that are near each other.
 
     An object is for one thread at a time. `skin`: m; pairs nearer than this are in the list. `cut`: True: a contact acts only on the motors
-    of the part that touches, as in the program of 2014; False: also on the motors nearer to the base.
+    of the part that touches, as in the MoBeE program of 2014; False: also on the motors nearer to the base.
     """
 
     def __init__(self, engine: Engine, skin: float, cut: bool = False) -> None:

@@ -109,7 +109,7 @@ class World:
     def move(self, name: str, *, position: ArrayLike | None = None, rotation: ArrayLike | None = None) -> None:
         """Set the position (3,) m, the rotation (3, 3) or both of an object, in the root frame; None: it is not changed.
 
-        Raises UnknownName, and InvalidValue for an attached object.
+        Raises UnknownName for an unknown object, and InvalidValue for an attached one, or for a position or rotation that is not valid.
         """
         at = None if position is None else valid_position(name, position)
         turn = None if rotation is None else valid_rotation(name, rotation)
@@ -121,13 +121,16 @@ class World:
             self._snapshot = changed(self._snapshot, moved)
 
     def remove(self, name: str) -> None:
-        """Remove an object from the world; raises UnknownName."""
+        """Remove an object from the world; raises UnknownName if there is no object with this name."""
         with self._lock:
             self._get(name)
             self._snapshot = shortened(self._snapshot, name)
 
     def set_role(self, name: str, role: Role) -> None:
-        """Make an object an "obstacle", a "target" or a "ghost"; raises UnknownName and InvalidValue."""
+        """Make an object an "obstacle", a "target" or a "ghost".
+
+        Raises UnknownName for an unknown object, InvalidValue for another role.
+        """
         valid = valid_role(name, role)
         with self._lock:
             self._snapshot = changed(self._snapshot, replace(self._get(name), role=valid))

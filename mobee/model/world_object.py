@@ -41,7 +41,7 @@ def sphere(radius: float) -> Geometry:
 
 
 def box(x: float, y: float, z: float) -> Geometry:
-    """Return a box with these full edges [m] along its own axes; raises InvalidValue unless each is 1e-9 to 1e5 m."""
+    """Return a box with full edges x, y and z [m] along its own axes; raises InvalidValue unless each is 1e-9 to 1e5 m."""
     return Geometry("box", _lengths("box", x=x, y=y, z=z))
 
 
@@ -144,7 +144,7 @@ def valid_shape(name: str, shape: Geometry) -> Geometry:
 
 
 def valid_position(name: str, given: ArrayLike) -> Array:
-    """Return a copy of a position (3,) m; raises InvalidValue unless it is three finite numbers.
+    """Return a copy of the position `given` (3,) m; raises InvalidValue unless it is three finite numbers.
 
     `name`: name of the object, for the message.
     """
@@ -155,7 +155,7 @@ def valid_position(name: str, given: ArrayLike) -> Array:
 
 
 def valid_rotation(name: str, given: ArrayLike) -> Array:
-    """Return a copy of a rotation (3, 3); raises InvalidValue unless it is orthonormal and right-handed.
+    """Return a copy of the rotation `given` (3, 3); raises InvalidValue unless it is orthonormal and right-handed.
 
     `name`: name of the object, for the message.
     """

@@ -4,7 +4,7 @@
 The programs run a compiled form of the same functions; tests compare the two. Nothing else in the library imports this package.
 
 - `kinematics`: links, markers and Jacobians at a pose (thesis 2.3.1, eq. 5.1).
-- `forces`: every force of eq. 5.7, in both variants of the law (eqs. 5.8 to 5.17).
+- `forces`: every force of eq. 5.7, in both variants of the control law (eqs. 5.8 to 5.17).
 - `law`: the sum of the forces (eq. 5.7), one step of the dynamical system and its command; the list to which a new force is added.
 - `reach`: the force that pulls a marker to a target (thesis 8.2).
 - `motors`: how a motor follows its command, and the noise of the encoders.

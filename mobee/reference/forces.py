@@ -140,7 +140,7 @@ def limit_force(s: State) -> Array:
 
 
 def clause_force(s: State) -> Array:
-    """Return f_cst (eqs. 5.14 to 5.17), (n,) rad/s^2, which keeps all clauses satisfied, in the variant of the law that `gains.law` names.
+    """Return f_cst (eqs. 5.14 to 5.17), (n,) rad/s^2, which keeps all clauses satisfied, in the variant `gains.law` of the control law.
 
     A clause is a condition on motor positions: at least one of its rows must hold. It acts while none of its rows holds with a margin of
     `constraint_width`. A row holds when a.q + b > 0, the convention of the robot files; the thesis prints n.q < b (eq. 5.14).
@@ -229,7 +229,8 @@ def push_factor(robot: Robot, frames: Array, contact: Contact, contacts: Sequenc
 def bounded_contact(robot: Robot, gains: Gains, torque: Array) -> Array:
     """Return L of the sum in eq. 5.11: saturate the norm of the force on each part as in eq. 5.8; returns (n,) rad/s^2.
 
-    `torque`: the sum, (n,) m^2/rad. The program of 2014 squares the norm, in degrees, before it is saturated.
+    `torque`: the sum, (n,) m^2/rad. `gains`: of the control law; its variant "published_2014", that of the MoBeE program of 2014, squares
+    the norm, in degrees, before it is saturated.
     """
     unit = motor_units(robot)
     force = gains.contact_gain * torque * unit

@@ -49,7 +49,11 @@ def joint_motion(joint: Joint, position: float) -> Array:
 
 
 def link_frames(robot: Robot, q: Array) -> Array:
-    """Return the transform of every link from zero pose to q (n,) rad, (L, 4, 4), root frame: the product over the joints that carry it."""
+    """Return the transforms of all links at the motor positions q (n,) rad, (L, 4, 4), in the root frame.
+
+    The transform of a link moves a point of the link from its place at zero pose to its place at q. It is the product of the transforms
+    (`joint_motion`) of the joints from the base to the link; that of the base is the identity.
+    """
     frames = [np.eye(4)]  # link 0 is the base
     for joint, position in zip(robot.joints, joint_positions(robot, q), strict=True):
         frames.append(frames[joint.parent] @ joint_motion(joint, position))  # joint j moves link j + 1

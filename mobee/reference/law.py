@@ -50,7 +50,8 @@ class Motion:
     """The state of the dynamical system; arrays (n,) in the order of `robot.motors`.
 
     `velocity`: rad/s, the system's own q'. `acceleration`: rad/s^2, of the commanded velocity. `sent`: rad/s, the velocity that was
-    commanded last; it differs from `velocity` only for a part that was just put in hold. `reference`: rad, the position command.
+    commanded last; it differs from `velocity` only for a part that was just put in hold (stands still, follows no commands). `reference`:
+    rad, the position command.
     """
 
     velocity: Array
@@ -77,7 +78,8 @@ def acceleration(state: State, terms: Sequence[Term] = TERMS) -> Array:
 def at_rest(robot: Robot, gains: Gains, q: Array) -> Motion:
     """Return the state of the dynamical system at rest at the measured q (n,) rad.
 
-    The position reference is q; for a motor with weight 0 in the gains, which the law never moves, it is q clipped to the motor's limits.
+    The position reference is q; for a motor with weight 0 in the gains, which the control law never moves, it is q clipped to the motor's
+    limits.
     """
     still = np.zeros(len(q))
     return Motion(still, still, still, np.where(gains.weight(robot.motors) > 0, q, np.clip(q, *robot.limits.T)))
@@ -108,7 +110,7 @@ def step(robot: Robot, gains: Gains, motion: Motion, q: Array, wanted: Array, dt
 
 
 def hold(robot: Robot, motion: Motion, part: str) -> Motion:
-    """Return the state after the part is put in hold: its velocity and acceleration are 0.
+    """Return the state after the part is put in hold (it stands still): its velocity and acceleration are 0.
 
     The commanded velocity (`sent`) is not changed here; in later steps it decreases as fast as the acceleration limit allows.
     """

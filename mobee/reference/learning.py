@@ -80,9 +80,9 @@ def value_iteration(
 ) -> tuple[Array, Array]:
     """Return V (S,) and Q (S, A), computed by sweeps until no Q changes by `tolerance` or more (Algorithm 7).
 
-    `outcomes` (S, A, B): the states in the B bins of each state-action; `chances` (S, A, B): their probabilities. `reward` (S, A); -inf:
-    no such action. `start` (S,): first values, None: 0; a state without actions keeps its value. The thesis prints the change without its
-    absolute value, with which the sweeps would end too early whenever values have to decrease.
+    `outcomes` (S, A, B): the states in the B bins of each state-action; `chances` (S, A, B): their probabilities. `reward` (S, A); -inf: no
+    such action. `discount`: factor of future rewards, 0 to 1. `start` (S,): first values, None: 0; a state without actions keeps its value.
+    The thesis prints the change without its absolute value, with which the sweeps would end too early whenever values have to decrease.
     """
     values = np.zeros(len(outcomes)) if start is None else start
     exists = chances.any(axis=-1) & (reward != -np.inf)

@@ -47,7 +47,10 @@ class MotorState:
 
 
 def at_rest(robot: Robot, parameters: MotorParameters, q: Array, dt: float) -> MotorState:
-    """Return the state of the motors with every motor in hold and at rest at q (n,) rad; `dt`: the length of a substep [s]."""
+    """Return the state of the motors with every motor in hold and at rest at q (n,) rad.
+
+    In hold a motor keeps its position. `dt`: the length of a substep [s].
+    """
     n, zero = len(q), np.zeros(len(q))
     line = [zero] * (int(substeps_late(robot, parameters, dt).max(initial=0)) + 1)
     return MotorState(q, zero, q, zero, np.full(n, "hold", dtype="<U8"), zero, np.ones(n, dtype=bool), q, zero, line)
@@ -59,7 +62,7 @@ def substeps_late(robot: Robot, parameters: MotorParameters, dt: float) -> NDArr
 
 
 def command(s: MotorState, where: slice, mode: str, reference: Array | None = None) -> None:
-    """Set the mode and the reference of some motors, in place; `where`: their slice of q.
+    """Set the kind of command (`mode`) and the reference of some motors, in place; `where`: their slice of q.
 
     `mode`: "position" (reference in rad), "velocity" (rad/s), "torque" (N m) or "hold" (None). If the mode of a motor changes, its delayed
     commands would have another unit: they are replaced by the motor's present velocity, or by the torque that carries its load. In torque

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A plant in plain Python, tick by tick: robot, motors, model and law, with the law as a list of terms.
+"""A plant in plain Python, tick by tick: robot, motors, model and law, with the control law as a list of terms.
 
 It is for trying a new force before the force is compiled (`mobee.reference.law`). It is hundreds of times slower than
 `mobee.OfflinePlant`, with the same numbers up to rounding.
@@ -36,8 +36,8 @@ class Plant:
     ) -> None:
         """Make a plant at rest at the robot's home.
 
-        `seed`: of the encoders' noise. `gains`, `parameters`: of the law and the motors; None: the defaults. `dt`: length of a tick [s].
-        `terms`: the forces of eq. 5.7, each a function of the `State`.
+        `seed`: of the encoders' noise. `gains`, `parameters`: of the control law and the motors; None: the defaults. `dt`: length of a tick
+        [s]. `terms`: the forces of eq. 5.7, each a function of the `State`.
         """
         self.model, self.robot, self.seed, self.dt, self.terms = model, model.robot, seed, dt, terms
         self.gains = Gains.default() if gains is None else gains
@@ -52,7 +52,7 @@ class Plant:
         self.q = self.robot.home.copy()  # the last encoder values, rad
 
     def tick(self) -> None:
-        """Run one control tick: apply the last command, read the encoders, compute contacts and the law, and move the motors."""
+        """Run one control tick: apply the last command, read the encoders, compute contacts and the control law, and move the motors."""
         self.ticks += 1
         if self.ticks > 1:
             motors.command(self.motors, slice(None), "velocity", self.motion.velocity)

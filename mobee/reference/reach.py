@@ -88,7 +88,7 @@ class View:
 
     `error`: (3,) m, from the marker to its goal. `turn`: (3,) n x n*, the axis about which the normal n should turn to the wanted normal
     n*. `facing`: n . n*. `columns`: (k, 6), velocity and angular velocity of the marker for each of the k joints between base and marker.
-    `drives`: (k, m), motion of these joints for each of the m pulled motors, in the motor's unit of the law.
+    `drives`: (k, m), motion of these joints for each of the m pulled motors, in the motor's unit of the control law.
     """
 
     error: Array

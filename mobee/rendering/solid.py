@@ -114,7 +114,10 @@ def object_solids(objects: Mapping[str, WorldObject]) -> list[Solid]:
 
 
 def trail_solids(points: Array, group: int = TRAIL_GROUP) -> list[Solid]:
-    """Return the path of a marker through points (P, 3) m as solids: a line that is brighter towards its end, and a ball at the end."""
+    """Return the path of a marker through points (P, 3) m as solids: a line that is brighter towards its end, and a ball at the end.
+
+    `group`: number that the solids get as `Solid.group`.
+    """
     path = _thinned(points)
     shares = np.linspace(0.0, 1.0, max(len(path) - 1, 1))[:, None]
     colors = [(float(r), float(g), float(b)) for r, g, b in (1.0 - shares) * OLD + shares * NEW]

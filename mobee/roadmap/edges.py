@@ -189,7 +189,7 @@ class EdgeWatch:
 
 
 def apart(places: Array, item: WorldObject) -> Array:
-    """Return the distances (N,) m of points (N, 3) m, root frame, from an object that is not attached to a link; 0 inside the object."""
+    """Return the distances (N,) m of `places` (N, 3) m, root frame, from an object that is not attached to a link; 0 inside the object."""
     local = np.abs((places - item.position) @ item.rotation)
     size = item.size
     if item.kind == "box":

@@ -160,7 +160,7 @@ def free_path(model: Model, roads: Graph, edges: Ints, start: Array, to_enter: A
 
     Args:
         model: robot and world.
-        roads: the graph of the map.
+        roads: the graph of the roadmap.
         edges: (E, 2) all edges of the graph, the lower vertex first.
         start: (n,) rad.
         to_enter: (V,) distances of the vertices from the start; infinite: the vertex is not used as the first one.

@@ -59,7 +59,7 @@ class Free:
 
     Args:
         free: takes poses (P, n) rad and returns whether each is valid, (P,).
-        rest: (n,) rad, positions of the motors that do not move.
+        rest: (n,) rad, a pose of all motors, at which the motors that do not move stay.
         columns: (d,) indices of the motors that move.
         limits: (d, 2) rad, of the motors that move.
         step: largest distance between two checked poses of a motion, as a fraction of each motor's range.
@@ -285,7 +285,8 @@ def prm(
         motors: names of motors or parts that move; None: all.
         milestones: least number of poses.
         neighbours: number of nearest poses to which the planner tries to join each pose.
-        rest: (n,) rad, positions of the other motors; None: the home posture.
+        rest: (n,) rad, a pose of all motors, at which the motors that do not move stay; the values of the others are not used. None: the
+            home posture.
         seed: of the samples.
         step: fraction of each motor's range between the checked poses of a motion.
 
@@ -311,7 +312,8 @@ def prm_star(
         model: robot and world.
         motors: names of motors or parts that move; None: all.
         milestones: least number of poses.
-        rest: (n,) rad, positions of the other motors; None: the home posture.
+        rest: (n,) rad, a pose of all motors, at which the motors that do not move stay; the values of the others are not used. None: the
+            home posture.
         seed: of the samples.
         step: fraction of each motor's range between the checked poses of a motion.
 
@@ -327,7 +329,8 @@ def query(
     """Return a function that plans with `rrt_connect` for some joints of the robot, as `MapExplorer` needs it.
 
     The function takes a pose of the joints (d,) rad and goal poses (G, d) rad; it returns poses (K, d) rad from the start to one of the
-    goals, or None. The other motors stay at `rest` (n,) rad. `extensions`: number of extensions of the trees after which the search ends.
+    goals, or None. The other motors stay at their positions in `rest`, a pose (n,) rad of all motors. `seed`: of the random samples of each
+    search. `extensions`: number of extensions of the trees after which the search ends.
     """
     whole = _poses(model, rest)
     columns = np.array([model.robot.motor_index(joint) for joint in joints])

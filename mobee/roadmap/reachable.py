@@ -40,8 +40,8 @@ def nearest_posture(model: Model, part: str, marker: str, position: Array, q: Ar
     """Return the posture that brings the marker nearest to `position` (3,) m, root frame, with the motors of one part.
 
     The other motors stay as in q (n,) rad. The posture is found by least squares within the motors' limits, from q and from random
-    postures; so it is the nearest posture with high probability, not with certainty. Contacts are ignored. Raises InvalidValue if the part
-    does not move the marker, or if `position` or q is not valid.
+    postures; so it is the nearest posture with high probability, not with certainty. `seed`: of the random postures. Contacts are ignored.
+    Raises InvalidValue if the part does not move the marker, or if `position` or q is not valid.
     """
     motors = [model.robot.motors[motor] for motor in _movers(model, part, marker)]
     problem = Problem(model, [costs.position(marker, position, tolerance=MET)], q, motors)

@@ -69,7 +69,7 @@ class Roadmap:
         return self.model.robot.motors if known is None else tuple(known)
 
     def entry(self, q_from: ArrayLike) -> int:
-        """Return the vertex nearest to a posture (n,) rad; the distance is over `motors`, each divided by its range."""
+        """Return the vertex nearest to the posture `q_from` (n,) rad; the distance is over `motors`, each divided by its range."""
         return int(self._from(q_from).argmin())
 
     def exit(self, y_goal: ArrayLike) -> int:
@@ -80,10 +80,10 @@ class Roadmap:
         return int(self._to(y_goal).argmin())
 
     def vertex_path(self, q_from: ArrayLike, y_goal: ArrayLike, free: bool = False) -> list[int]:
-        """Return the numbers of the vertices on the shortest path from a posture (n,) rad to the vertex nearest to `y_goal` (m,).
+        """Return the numbers of the vertices on the shortest path from `q_from` (n,) rad to the vertex nearest to `y_goal` (m,).
 
-        `free`: return only a path without contacts in the present world. Raises InvalidValue if the map is empty or has no vertex near the
-        goal, and MobeeError if start and goal are in unconnected parts of the map or every path has contacts.
+        `free`: return only a path without contacts in the present world. Raises InvalidValue if the roadmap is empty or has no vertex near
+        the goal, and MobeeError if start and goal are in unconnected parts of the map or every path has contacts.
         """
         if free:
             return free_path(self.model, self.graph, self.edges, self._posture(q_from), self._from(q_from), self._to(y_goal))
@@ -94,7 +94,7 @@ class Roadmap:
         return vertices
 
     def path(self, q_from: ArrayLike, y_goal: ArrayLike, free: bool = False) -> Array:
-        """Return the shortest path through the map from a posture to the vertex nearest to a goal, as poses (K, n) rad.
+        """Return the shortest path through the roadmap from a posture to the vertex nearest to a goal, as poses (K, n) rad.
 
         Straight lines join the poses; the first line, from q_from to the nearest vertex, is not an edge of the map.
 

@@ -63,8 +63,8 @@ def fine_units(robot: Robot) -> Array:
 def limit_zones(robot: Robot, width: Array) -> Array:
     """Return the widths of the zones at the lower and the upper limit of each motor, (n, 2), in the unit of the motor.
 
-    In a zone the law pushes inward. `width` (n,): the width of the zones in the gains, in the unit of the motor. A zone is at most WIDEST
-    (1/4) of the motor's range. If the motor's `zone_ends_at_home` is set, a zone that would include the home position ends there.
+    In a zone the control law pushes inward. `width` (n,): the width of the zones in the gains, in the unit of the motor. A zone is at most
+    WIDEST (1/4) of the motor's range. If the motor's `zone_ends_at_home` is set, a zone that would include the home position ends there.
     """
     low, high = robot.limits.T
     widest = np.minimum(width, WIDEST * (high - low))

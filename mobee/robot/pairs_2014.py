@@ -174,7 +174,7 @@ def recorded_neighbours(elements: Sequence[Element], bearing: Collection[int]) -
 
 
 def near_root(parents: Sequence[int], tags: Sequence[str], index: int) -> bool:
-    """Return whether an element counts as the base in the program of 2014 (KinTreeNode::isNearRoot), so that the world does not touch it.
+    """Return whether MoBeE of 2014 counted an element as the base (KinTreeNode::isNearRoot), so that it ignored contacts with the world.
 
     A search climbs from the element over one change from link to joint and one change from joint to link, and then over elements with the
     same tag as the first element. An element is near the root if this search arrives at the root. `parents`: for each element the index of

@@ -248,7 +248,7 @@ class Motors:
         self.state["load"] = torque
 
     def command(self, where: slice, mode: Mode, reference: Array | None = None) -> None:
-        """Set the mode and the reference of the motors `where`, a range of indices.
+        """Set the kind of command (`mode`) and the reference of the motors `where`, a range of indices.
 
         `reference`: (m,), rad, rad/s or N m by the mode; None for a hold. A hold decelerates at once, without the delay of other commands,
         and then keeps the position reached. Motors that enter torque mode compensate gravity until the first torque command takes effect.

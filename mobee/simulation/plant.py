@@ -337,7 +337,7 @@ class OfflinePlant:
     def running(self, ticks: int) -> Work[Trace]:
         """Return the computation of `run` as a generator of its steps, for a caller that runs several plants at once.
 
-        Each step yields the address of the structure that the core must run next; the return value is that of `run`.
+        Each step yields the address of the structure that the core must run next; the return value is that of `run`. `ticks`: their number.
         """
         rows, left = [np.zeros((0, 3 * len(self.robot.motors) + 2))], ticks
         while left > 0:

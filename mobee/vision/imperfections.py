@@ -65,7 +65,7 @@ class CameraSettings(Settings):
 
     @property
     def deviations(self) -> Mapping[str, float]:
-        """The standard deviations of the drawn errors along each axis, by kind; a calibration uses them as its prior.
+        """A dict from the kind of error to its standard deviation along each axis; a calibration uses them as its prior.
 
         The kinds are "position" and "rotation" of a mount, "encoder", "latency", "tag_position" and "tag_rotation", in m, rad and s.
         """
@@ -104,7 +104,7 @@ class CameraErrors:
 
 
 def camera_errors(settings: CameraSettings, robot: Robot, cameras: Sequence[str], seed: int) -> CameraErrors:
-    """Draw the errors of one robot's cameras; `cameras`: their names.
+    """Draw the errors of one robot's cameras; `cameras`: their names; `seed`: of the draws.
 
     Displacements and rotations are uniform in balls, encoder offsets and latency are uniform in intervals, with the bounds of `settings`.
     """

@@ -52,7 +52,10 @@ class Check:
 
 
 def service(player: Player, part: str) -> None:
-    """Test that robot_sim has a liveliness token and answers the calls of every service (stat, config, pulse); raises Broken otherwise."""
+    """Test that robot_sim has a liveliness token and answers the calls of every service (stat, config, pulse); raises Broken otherwise.
+
+    `part`: not used.
+    """
     if not player.service.alive.get("robot_sim"):
         raise Broken("there is no liveliness token alive/robot_sim/INSTANCE: declare it after all subscriptions and calls")
     if len(player.service.alive["robot_sim"]) > 1:
@@ -90,7 +93,10 @@ def streams(player: Player, part: str) -> None:
 
 
 def ticks(player: Player, part: str) -> None:
-    """Test that numbers, times and rate of the ticks of 1.5 s are those of the contract; raises Broken otherwise."""
+    """Test that numbers, times and rate of the ticks of 1.5 s are those of the contract; raises Broken otherwise.
+
+    `part`: not used.
+    """
     first = len(player.ticks)
     player.wait(OBSERVED)
     seen = player.ticks[first:]
@@ -113,7 +119,10 @@ def ticks(player: Player, part: str) -> None:
 
 
 def positions(player: Player, part: str) -> None:
-    """Test that all motor positions are within the limits of the robot file, with a tolerance of 5 degrees; raises Broken otherwise."""
+    """Test that all motor positions are within the limits of the robot file, with a tolerance of 5 degrees; raises Broken otherwise.
+
+    `part`: not used.
+    """
     low, high = player.robot.limits.T
     q = np.array(player.tick.q)
     beyond = np.maximum(q - high, low - q)
@@ -124,7 +133,10 @@ def positions(player: Player, part: str) -> None:
 
 
 def ownership(player: Player, part: str) -> None:
-    """Test that take, arm and release work, that epochs grow, and that no other process can take an owned part; raises Broken otherwise."""
+    """Test that take, arm and release work, and that no other process can take an owned part; raises Broken otherwise.
+
+    Also tested: every take returns a larger epoch (number of the ownership) than all before, and an older epoch is refused.
+    """
     first = player.take(part)
     if player.take(part) <= first:
         raise Broken(f"take returns epoch {player.epochs[part]} after {first}: each epoch must be larger than all before")
@@ -140,7 +152,7 @@ def ownership(player: Player, part: str) -> None:
 
 
 def hold(player: Player, part: str) -> None:
-    """Test that a part which is not armed does not move when it receives commands; raises Broken otherwise."""
+    """Test that a part which is not armed (released to follow commands) does not move when it receives some; raises Broken otherwise."""
     player.take(part)
     start = player.q(part)
     player.keep(part, "velocity", lambda: _speed(player, part), MOTION)
@@ -151,7 +163,7 @@ def hold(player: Player, part: str) -> None:
 
 
 def obeys(player: Player, part: str) -> None:
-    """Test that an armed part follows velocity commands and position commands; raises Broken otherwise."""
+    """Test that an armed part, released to follow commands, obeys velocities and positions; raises Broken otherwise."""
     with player.armed(part):
         start, speed = player.q(part), _speed(player, part)
         player.keep(part, "velocity", lambda: speed, MOTION)
@@ -171,7 +183,10 @@ def obeys(player: Player, part: str) -> None:
 
 
 def refuses(player: Player, part: str) -> None:
-    """Test that invalid commands and commands for an old tick do not come into force; raises Broken otherwise."""
+    """Test that invalid commands and commands for an old tick do not come into force; raises Broken otherwise.
+
+    `player`: the connection with robot_sim. `part`: part that the checks with commands use.
+    """
     n = len(player.robot.part(part))
     still, nan = np.zeros(n), np.full(n, math.nan)
     limits = player.robot.limits[player.robot.part(part).slice]
@@ -217,7 +232,7 @@ def owner_gone(player: Player, part: str) -> None:
 def model_gone(player: Player, part: str) -> None:
     """Test that all parts go into hold when the liveliness token of the model disappears; raises Broken otherwise.
 
-    All parts are armed; `part` moves, and the others are commanded not to move.
+    All parts are armed (they follow commands); in hold they stand still; `part` moves, and the others are commanded not to move.
     """
     _hold_without(player, [part, *(name for name in player.robot.parts if name != part)], "model", owner=False)
 

@@ -77,7 +77,7 @@ class Player:
     # Time
 
     def wait(self, seconds: float) -> None:
-        """Wait for a time [s], and record the messages that arrive."""
+        """Wait for `seconds`, and record the messages that arrive."""
         self.service.spin(time.monotonic() + seconds)
 
     def until(self, condition: Callable[[], bool], seconds: float) -> bool:
@@ -112,14 +112,14 @@ class Player:
     def call(self, key: str, request: type[Request], reply: type[_R], **fields: Any) -> _R:
         """Call robot_sim as its controller, and return the reply; raises services.common.rpc.CallFailed.
 
-        `request`, `reply`: types of request and reply. `fields`: fields of the request.
+        `key`: key of the call on the bus. `request`, `reply`: types of request and reply. `fields`: fields of the request.
         """
         return self.service.call(key, request, reply, timeout=ANSWER, **fields)
 
     def call_as_operator(self, key: str, request: type[Request], reply: type[_R]) -> _R:
         """Call robot_sim as an operator (a person), for calls that a controller may not make; return the reply.
 
-        Raises services.common.rpc.CallFailed.
+        Raises services.common.rpc.CallFailed. `key`: key of the call on the bus. `request`, `reply`: types of request and reply.
         """
         return rpc.call(self.service.bus.session, OPERATOR, key, request, reply, timeout=ANSWER)
 

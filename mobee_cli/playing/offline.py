@@ -30,7 +30,7 @@ FIRST_REPORT = 5.0  # min of robot time; the next report follows after twice the
 class Learning:
     """Agents that learn on one offline plant.
 
-    `begun`: number of transitions in the file at the start. `seconds`: real time of learning so far [s].
+    `begun`: number of transitions in the file of the agents at the start. `seconds`: real time of learning so far [s].
     """
 
     plant: OfflinePlant
@@ -50,7 +50,7 @@ class Learning:
 
     @property
     def kept(self) -> int:
-        """The number of transitions in the file, including those of earlier processes."""
+        """The number of transitions in the file of the agents, including those of earlier processes."""
         return sum(len(_made(agent)) for agent in self.agents)
 
     def numbers(self) -> dict[str, Any]:

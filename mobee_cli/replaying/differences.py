@@ -43,7 +43,7 @@ MISSING = "missing"
 
 
 def difference(tick: int, key: str, first: Any, second: Any, ignored: Collection[str] = ()) -> Difference | None:
-    """Compare two messages, to the last bit, and return the first field in which they differ; None if they are equal.
+    """Compare the messages `first` and `second`, to the last bit, and return the first field in which they differ; None if they are equal.
 
     `tick`, `key`: stored in the result. `ignored`: names of fields that may differ.
     """
@@ -71,7 +71,7 @@ def _differing(first: Any, second: Any, ignored: Collection[str], place: str) ->
 
 
 def compare(tick: int, first: Sequence[Item], second: Sequence[Item], ignored: Collection[str]) -> Difference | None:
-    """Return the first difference between two lists of messages of one tick; None if there is none.
+    """Return the first difference between `first` and `second`, lists of the messages of one tick; None if there is none.
 
     The messages are compared key by key, in the order in which the control loop publishes them. `ignored`: names of fields that may differ.
     """

@@ -3,7 +3,8 @@
 
 In every tick the service receives the recorded input. The recording also gives the order of the calls: a call that the service had answered
 before it answered the tick is made before the tick, any other call after it. All messages from the recording have their recorded bytes. The
-only exception are the epochs of goals: a controller counts them from its start, so the recorded epochs are translated.
+only exception are the epochs of goals, the numbers of their ownerships: a controller counts them from its start, so the recorded epochs are
+translated.
 """
 
 from __future__ import annotations

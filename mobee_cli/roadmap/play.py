@@ -62,7 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run `mobee roadmap play`: find the path, move the robot along it, and print the result.
+    """Run `mobee roadmap play`: find a path through a roadmap, move the robot along it, and print the result.
 
     Returns the exit code (0: arrived, 1: not arrived).
     """

@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run `mobee roadmap query`: find the path, print it, and return the exit code (0: the path has no contacts, 1: it has)."""
+    """Run `mobee roadmap query`: find a path through a roadmap, print it, and return the exit code (0: it has no contacts, 1: it has)."""
     trm = map_given(arguments)
     found = find_path(trm, start_of(trm, arguments.start), arguments.to)
     print(
@@ -96,7 +96,7 @@ def _shortest(trm: Roadmap, start: Array, goal: list[float]) -> list[int]:
 
 
 def path_text(trm: Roadmap, found: dict[str, Any]) -> list[str]:
-    """Return a path, as returned by `find_path`, as lines of text, at most 80 columns wide."""
+    """Return the path `found`, as returned by `find_path`, as lines of text, at most 80 columns wide."""
     vertices, place = found["vertices"], np.array(found["place"])
     count = len(vertices)
     lines = wrapped(

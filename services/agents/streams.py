@@ -33,7 +33,7 @@ def publish_transition(
     """Publish a transition, the n-th of its agent.
 
     `space`: the state space of the agent. `value`: V(s), the value of the state before the action, by the plan that chose the action.
-    `probability`: probability of the observed next state by the agent's model before the action.
+    `probability`: probability of the observed next state by the agent's model before the action. `made`: the transition.
     """
     stream.put(
         agent=space.part,

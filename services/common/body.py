@@ -46,5 +46,5 @@ class Body:
         return dq
 
     def ages(self, t: int) -> dict[str, int]:
-        """Return the age [ns] of each part's state at the bus time t [ns], by part."""
+        """Return a dict from each part to the age [ns] of its newest state at the bus time t [ns]."""
         return {name: t - state.t for name, state in self.states.items()}

@@ -128,8 +128,9 @@ def part_of(cls: type[Message], name: str) -> str | None:
 def other_key(received: zenoh.Sample | zenoh.Query) -> str:
     """Return the key under which a message or call was sent, if it has arrived under another key; otherwise an empty text.
 
-    Each sender attaches the key, because Zenoh transmits numbers in place of keys: just after a connection has ended and a new one has
-    begun, a number can stand for another key. If the attached key is empty, the result is "nothing"; if none is attached, it is empty.
+    `received`: the message or call, as Zenoh has delivered it. Each sender attaches the key, because Zenoh transmits numbers in place of
+    keys: just after a connection has ended and a new one has begun, a number can stand for another key. If the attached key is empty, the
+    result is "nothing"; if none is attached, it is empty.
     """
     attached = received.attachment
     if attached is None or (sent := attached.to_bytes()) == str(received.key_expr).encode():
@@ -138,7 +139,10 @@ def other_key(received: zenoh.Sample | zenoh.Query) -> str:
 
 
 def require_key(received: zenoh.Sample | zenoh.Query) -> None:
-    """Raise Refused if a message or call has arrived under another key than the one that its sender has attached."""
+    """Raise Refused if a message or call has arrived under another key than the one that its sender has attached.
+
+    `received`: the message or call, as Zenoh has delivered it.
+    """
     if sent := other_key(received):
         raise Refused("key", f"sent as {sent}")
 
@@ -168,7 +172,7 @@ class Bus:
         """Return the present time of the bus clock, ns.
 
         In free mode the time since the newest tick is added, so that the result is right also in the middle of a tick or of a long
-        computation. In lockstep it is the time of the newest tick.
+        computation. In lockstep (every tick waits for all participants) it is the time of the newest tick.
         """
         return self.t + round(1e9 * self._speed * (time.monotonic() - self._ticked))
 

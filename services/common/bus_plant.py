@@ -418,7 +418,10 @@ class BusPlant:
             raise ActionInterrupted("robot_sim started a new run")
 
     def leave(self) -> None:
-        """Release all goals, remove the target and, in lockstep, end the participation of this service."""
+        """Release all goals, remove the target and, in lockstep, end the participation of this service.
+
+        In lockstep every tick waits for all participants.
+        """
         for part in list(self._epochs):
             self.release(part)
         self._reaches.leave()

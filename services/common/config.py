@@ -140,7 +140,7 @@ def read_toml(path: Path, cls: type[_C]) -> _C:
 
 
 def convert(data: dict[str, Any], cls: type[_C], where: Callable[[str], str], prefix: str = "") -> _C:
-    """Return the settings in a dict as a struct of the type `cls`; raises ConfigError, whose message names the field.
+    """Return the settings in the dict `data` as a struct of the type `cls`; raises ConfigError, whose message names the field.
 
     `where(field)`: returns the place of a field for the message, such as "file:line". `prefix`: text before all names of fields in
     messages, such as "shared.".
@@ -170,7 +170,7 @@ def check_names(data: dict[str, Any], cls: type[Struct], where: Callable[[str], 
 
 
 def nearest(given: str, valid: Iterable[str]) -> str:
-    """Return the end of a message about an unknown name: the most similar valid name, and all valid names."""
+    """Return the end of a message about the unknown name `given`: the most similar valid name, and all valid names."""
     names = list(valid)
     near = difflib.get_close_matches(given, names, n=1)
     return f"{f' Did you mean {near[0]!r}?' if near else ''} Valid: {', '.join(names) or 'none'}."

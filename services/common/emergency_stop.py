@@ -72,7 +72,7 @@ class StopRecord:
         return self._path
 
     def create(self) -> None:
-        """Make the file, which then records that the robot is released; an existing file stays. Raises OSError if it cannot be written."""
+        """Make the file of the record, which then says that the robot is released; an existing file stays. Raises OSError."""
         if not self._path.exists():
             self._path.parent.mkdir(parents=True, exist_ok=True)
             self.release()
@@ -109,9 +109,9 @@ class StopRecord:
     def stop(self, source: str, reason: str) -> bool:
         """Record a new stop, and return whether there is a file.
 
-        If a stop is in force already, it is replaced only if the launcher has set it and `source` is another process; else it stays. True
-        is returned in all these cases. False: there is no file; then no robot watches the record. Raises OSError if the file cannot be
-        written.
+        `source`: name of the process that stops the robot. `reason`: text for the user. If a stop is in force already, it is replaced only
+        if the launcher has set it and `source` is another process; else it stays. True is returned in all these cases. False: there is no
+        file; then no robot watches the record. Raises OSError if the file cannot be written.
         """
         if not self._path.exists():
             return False
@@ -121,11 +121,11 @@ class StopRecord:
         return True
 
     def latch(self, stop: Stop) -> None:
-        """Record a stop in place of the present content of the file; raises OSError if the file cannot be written."""
+        """Record a stop in place of the present content of the record's file; raises OSError if it cannot be written."""
         self._write({"stopped": True, "source": stop.source, "reason": stop.reason, "time": stop.time})
 
     def release(self) -> None:
-        """Record that the robot is released; raises OSError if the file cannot be written."""
+        """Record that the robot is released; raises OSError if the record's file cannot be written."""
         self._write({"stopped": False, "time": time.time(), "monotonic_ns": time.monotonic_ns()})
 
     def released_at(self) -> int:

@@ -47,7 +47,7 @@ def robot_of(config: ServiceConfig) -> Robot:
 def explained(prog: str) -> Iterator[None]:
     """If the `with` block raises an error of the project, print it as one line on standard error and exit.
 
-    The exit code is 2 if a setting is wrong, otherwise 1. `prog`: name of the program, for the line.
+    The exit code is 2 if a setting is wrong, otherwise 1. `prog`: name of the program that runs, for this line.
     """
     try:
         yield

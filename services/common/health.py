@@ -37,7 +37,7 @@ class Beats:
         self._count += 1
 
     def age(self, now: float) -> float | None:
-        """Return the time since the last event, s; None if there was none."""
+        """Return the time from the last event to `now`, s; None if there was none."""
         return None if self._last is None else now - self._last
 
     def end_window(self, now: float) -> None:

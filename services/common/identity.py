@@ -74,7 +74,7 @@ class Identity:
         return [socket, secured(endpoint)] if here else [secured(endpoint)]
 
     def require(self) -> None:
-        """Raise BadKeys if a file of this identity is missing, or if other users may read the private key or the folder."""
+        """Raise BadKeys if a file of this identity is missing, or if other users may read its private key or the folder of these files."""
         require_private(self.folder)
         for path in (self.authority, self.certificate, self.key):
             if not path.is_file():

@@ -28,7 +28,7 @@ class Listener:
     """Subscribes a process to streams, and handles their messages in the main thread of the process."""
 
     def __init__(self, bus: Bus, inbox: Inbox, locked: bool, direct: bool) -> None:
-        """`locked`: in lockstep.
+        """`locked`: in lockstep (every tick waits for all participants).
 
         `direct`: Zenoh's own thread puts messages into the inbox, without a thread of Python for each subscription.
         """

@@ -60,7 +60,7 @@ def listen(session: zenoh.Session, key: str, handle: Callable[[Received], None])
 
 
 def alive(session: zenoh.Session) -> dict[str, list[str]]:
-    """Return the ids of the running processes of each service, by name of the service, from their liveliness tokens."""
+    """Return a dict from the name of a service to the ids of its running processes, from their liveliness tokens."""
     found: dict[str, list[str]] = {}
     for answer in session.liveliness().get(keys.ALL_ALIVE, timeout=1.0):
         if answer.ok is not None:
@@ -70,7 +70,7 @@ def alive(session: zenoh.Session) -> dict[str, list[str]]:
 
 
 def stats(session: zenoh.Session, names: list[str], timeout: float = 1.0) -> dict[str, Stat]:
-    """Return the status of the services `names`, by name, all requested at once.
+    """Return a dict from each of the services `names` to its status, all requested at once.
 
     Services that do not answer within `timeout` [s] are left out.
     """

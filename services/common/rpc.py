@@ -77,7 +77,7 @@ def flush(session: zenoh.Session, who: str) -> None:
 
     Call this before a session is closed. Zenoh drops messages that it is sending when a session is closed, and a router drops what it has
     not read when it cannot write to a closed connection. The call to the router has the lowest priority, so the router answers it after all
-    other messages; it does so even if no service answers this key.
+    other messages; it does so even if no service answers this key. `who`: name of the calling process.
     """
     key, lowest = keys.service_rpc("router", "stat"), zenoh.Priority.BACKGROUND
     payload = encode(Empty(v=VERSION, id=uuid.uuid4().hex, who=who))

@@ -172,8 +172,9 @@ class Service(Listener):
     ) -> _R:
         """Call another service, wait for the reply and return it; raises services.common.rpc.CallFailed if there is no valid reply.
 
-        `request`, `reply`: types of request and reply. `fields`: fields of the request. `timeout`: time for each try, s; None: 0.5 s, in
-        lockstep 1.5 s. `tries`: how many times the call is sent while there is no answer; it has its effect at most once.
+        `key`: key of the call on the bus (`bus_schema.keys`). `request`, `reply`: types of request and reply. `fields`: fields of the
+        request. `timeout`: time for each try, s; None: 0.5 s, in lockstep 1.5 s. `tries`: how many times the call is sent while there is no
+        answer; it has its effect at most once.
         """
         return rpc.call(self.bus.session, self.who, key, request, reply, timeout=timeout or self.patience, tries=tries, **fields)
 
@@ -190,8 +191,9 @@ class Service(Listener):
     ) -> None:
         """Call another service without waiting; later, `done` is called in the main thread with the reply or with a CallFailed.
 
-        `request`, `reply`: types of request and reply. `fields`: fields of the request. `timeout`: s. `wanted`: if several processes may
-        answer, a function that returns True for the reply to use; if it is True for none, `done` gets the first.
+        `key`: key of the call on the bus (`bus_schema.keys`). `request`, `reply`: types of request and reply. `fields`: fields of the
+        request. `timeout`: s. `wanted`: if several processes may answer, a function that returns True for the reply to use; if it is True
+        for none, `done` gets the first.
         """
 
         def enqueue(answer: _R | rpc.CallFailed) -> None:

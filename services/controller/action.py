@@ -47,7 +47,8 @@ class Action:
     def start(self, action_id: str, k: int, t: float, target: Array | None = None) -> None:
         """Start an action whose goal was set at tick k, at the time t [s].
 
-        `target`: (n_part,) rad, the attractor to which the action may continue after a suspension; None: it cannot continue.
+        `action_id`: text that identifies the action in messages. `target`: (n_part,) rad, the attractor to which the action may continue
+        after a suspension; None: it cannot continue.
         """
         self.id, self.start_k, self.target, self._suspensions = action_id, k, target, 0
         self.settle_again(k, t)

@@ -61,14 +61,14 @@ class Drives:
         return self._now() < self._confirm_by[part]
 
     def forget(self) -> None:
-        """Drop all epochs and attempts in progress; call this at the start of a new run of robot_sim."""
+        """Drop the numbers of all ownerships (epochs) and all attempts in progress; call this at the start of a new run of robot_sim."""
         self.epochs = dict.fromkeys(self.epochs, 0)
         self._next_try = dict.fromkeys(self._next_try, 0.0)
         self._attempts.clear()
         self._stop_is_latched = False
 
     def watch_stop(self, parts: Mapping[str, PartStatus]) -> None:
-        """Read emergency stops from the bus; after a stop no part is armed until the gates show that the stop was reset.
+        """Read emergency stops from the bus; after a stop no part is armed until the safety gates show that the stop was reset.
 
         A stop is repeated on the bus until robot_sim has latched it, and forgotten when it was reset at robot_sim. `parts`: the newest
         status of each part.

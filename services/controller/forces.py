@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The law's inputs from outside: the forces of the model, checked, and user-defined terms."""
+"""The control law's inputs from outside: the forces of the model, checked, and user-defined terms."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class ModelForces:
     """
 
     def __init__(self, robot: Robot, needs_contacts: bool) -> None:
-        """`needs_contacts`: True if messages without contacts must be refused, because terms of the law may depend on contacts."""
+        """`needs_contacts`: True if messages without contacts must be refused, because terms of the control law may depend on contacts."""
         self._robot, self._needs_contacts = robot, needs_contacts
         self.message: ForcesMessage | None = None
         self.vectors: Forces  # each term (n,) rad/s^2, of `message`

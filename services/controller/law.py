@@ -55,7 +55,7 @@ class RobotLaw:
     # Ticks
 
     def reset(self) -> None:
-        """Reset the law at the start of a run: the robot is at rest at home, and no forces of the model are in force."""
+        """Reset the control law at the start of a run: the robot is at rest at home, and no forces of the model are in force."""
         self.forces.forget()
         self._last_k, self._last_tick = -1, None
         self._law.reset(self._robot.home)
@@ -71,7 +71,7 @@ class RobotLaw:
         return ticks
 
     def step(self, tick: Tick, ticks: int) -> Array:
-        """Advance the law over `ticks` ticks; return the reference (n,): rad, rad/s or N m, by the modality in the settings."""
+        """Advance the control law over `ticks` ticks; return the reference (n,): rad, rad/s or N m, by the modality in the settings."""
         for _ in range(ticks):
             self._state_before = self._law.state.copy()
             command = self._step(tick)
@@ -181,7 +181,7 @@ class RobotLaw:
         self._apply_client_forces()
 
     def set_push(self, part: str, marker: str, push: Array) -> None:
-        """Set the force of a client at a marker, for a part, (3,) m/s^2, root frame (thesis eq. 5.10).
+        """Set `push`, the force of a client at a marker, for a part: (3,) m/s^2, root frame (thesis eq. 5.10).
 
         A client is another process that commands the robot. The pushes at one marker that were set for several parts are added.
         """
@@ -211,7 +211,7 @@ class RobotLaw:
 def warm_up(law: Controller, robot: Robot) -> None:
     """Begin, step and end a reach of each part with each marker that it moves, and decode a request, so that later reaches start quickly.
 
-    Afterwards the law is at rest at home.
+    Afterwards the control law is at rest at home.
     """
     asked = ReachFor(
         v=VERSION, id="0", who="warm", epoch=0, action_id="0", marker="none", object="none", position=[0.0] * 3, radius=1.0, aim="centre"

@@ -12,7 +12,7 @@ from bus_schema.authority import BEHAVIOURS
 
 
 def rank_of(who: str) -> int:
-    """Return the rank of a service by its name: for a behaviour its index in BEHAVIOURS ("assist", "gaze"), for every other service 2."""
+    """Return the rank of the service named `who`: for a behaviour its index in BEHAVIOURS ("assist", "gaze"), for every other service 2."""
     return BEHAVIOURS.index(who) if who in BEHAVIOURS else len(BEHAVIOURS)
 
 

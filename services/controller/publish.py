@@ -112,8 +112,8 @@ class CommandPublisher:
     def send(self, k: int, orders: dict[str, Order], reference: Array, answer: Answer | None = None) -> None:
         """Publish the commands of tick k, if there are any.
 
-        `orders`: drive epoch and kind of command, by part. `reference`: (n,) rad, rad/s or N m, by the modality in the settings. `answer`:
-        the answer to the tick in lockstep; None: not in this message.
+        `orders`: dict from a part to the number of the controller's ownership of its drive (epoch) and the kind of command. `reference`:
+        (n,) rad, rad/s or N m, by the modality in the settings. `answer`: the answer to the tick in lockstep; None: not in this message.
         """
         self._sent = k, orders
         if orders:
@@ -122,7 +122,8 @@ class CommandPublisher:
     def send_again(self, part: str) -> None:
         """In free mode, let a client's request for a part take effect before the next tick.
 
-        The last control step is computed again with the request, and its commands are published. In lockstep nothing is done.
+        The last control step is computed again with the request, and its commands are published. In lockstep (every tick waits for all
+        participants) nothing is done.
         """
         if self._service.locked or self._sent is None or part not in self._sent[1]:
             return
@@ -134,8 +135,8 @@ class CommandPublisher:
         """In lockstep, publish the commands of a tick, and answer the tick in the same message.
 
         The answer is sent later if a part is being armed. Tick 0, which is repeated, is answered only when all parts are ready and the
-        forces are fresh. `fresh`: whether the forces of the model may be used. `orders`: drive epoch and kind of command, by part.
-        `reference`: (n,) rad, rad/s or N m, by the modality in the settings.
+        forces are fresh. `fresh`: whether the forces of the model may be used. `orders`: dict from a part to the number of the controller's
+        ownership of its drive (epoch) and the kind of command. `reference`: (n,) rad, rad/s or N m, by the modality in the settings.
         """
         if tick.k == 0 and not (fresh and self._is_ready(tick)):
             return

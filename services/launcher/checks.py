@@ -180,7 +180,7 @@ def check_lockstep(scenario: Scenario) -> None:
 
 
 def check_robots(scenario: Scenario) -> dict[str, Robot]:
-    """Load and return the robots of all services, by the name or path in their settings.
+    """Load the robots of all services; return a dict from the name or path in their settings to the robot.
 
     Raises ConfigError with a message of one line if a robot or world cannot be read, if its file has elements that the reader would ignore,
     or if a service names a part or motor that its robot does not have.

@@ -35,9 +35,9 @@ class Connection:
 
     `who`: name of this launcher on the bus. `endpoint`: address at which its services reach the router. `session`: the launcher's session.
     `router`: session that is the router; None: the router is on another host. `local`: second address of the router, for services of this
-    host in lockstep; empty: none. `security`: keys of this run of the launcher; None: the connections are not secured. `refusals`: log of
-    what a secured router refuses. `first`: agreement with the first launcher, if this launcher has joined another host; None: this launcher
-    is the first.
+    host in lockstep (every tick waits for all participants); empty: none. `security`: keys of this run of the launcher; None: the
+    connections are not secured. `refusals`: log of what a secured router refuses. `first`: agreement with the first launcher, if this
+    launcher has joined another host; None: this launcher is the first.
     """
 
     who: str

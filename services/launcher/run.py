@@ -70,11 +70,11 @@ class Options:
     `scenario`: shipped name or path. `settings`: changes of settings, each "table.field=value". `headless`: without the monitor. `page`:
     with the monitor, even if the scenario has none. `record`: with the recorder, if the scenario has a robot. `cameras`: cameras on links,
     each as in `services.common.cameras.CameraConfig.cameras`; with them the renderer starts, even if the scenario has none. `duration`: s
-    of real time after all services are ready; None: until the user stops it. `ticks`: in lockstep, number of ticks; None: no limit. `json`:
-    print the summary as JSON. `endpoint`: address of the router; None: that of the scenario. `runs`: parent of the run's folder. `keys`:
-    folder of keys; None: not secured. `insecure`: allow an address that other hosts reach, without keys. `elsewhere`: services that other
-    hosts start. `join`: address of the first host; None: this host is the first. `only`: services that this host starts when it joins.
-    `host`: name of this host when it joins.
+    of real time after all services are ready; None: until the user stops it. `ticks`: in lockstep (every tick waits for all participants),
+    number of ticks; None: no limit. `json`: print the summary as JSON. `endpoint`: address of the router; None: that of the scenario.
+    `runs`: parent of the run's folder. `keys`: folder of keys; None: not secured. `insecure`: allow an address that other hosts reach,
+    without keys. `elsewhere`: services that other hosts start. `join`: address of the first host; None: this host is the first. `only`:
+    services that this host starts when it joins. `host`: name of this host when it joins.
     """
 
     scenario: str = "default"

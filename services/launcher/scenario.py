@@ -59,7 +59,7 @@ class Scenario:
 
     @property
     def is_locked(self) -> bool:
-        """Whether the scenario runs in lockstep."""
+        """Whether the scenario runs in lockstep (every tick waits for all participants)."""
         return any(part.who == "robot_sim" and part.config.mode == "lock" for part in self.parts)
 
     def only(self, names: Collection[str]) -> Scenario:
@@ -79,7 +79,7 @@ class Scenario:
 
 
 def shipped() -> dict[str, Path]:
-    """Return the files of the shipped scenarios, by name."""
+    """Return a dict from the name of each shipped scenario to its file."""
     return {path.stem: path for path in sorted(SHIPPED.glob("*.toml"))}
 
 

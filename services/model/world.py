@@ -63,7 +63,7 @@ class WorldServer:
             self._expire(name, "it was not seen again in time")
 
     def positions(self, names: Collection[str]) -> dict[str, list[float]]:
-        """Return the positions [m], root frame, of the named objects, by name; names that are not in the world are left out."""
+        """Return a dict from each of the names to the position [m], root frame, of the object; names not in the world are left out."""
         known = self._model.world.objects
         return {name: self._in_root_frame(known[name]).position.tolist() for name in sorted(names) if name in known}
 

@@ -39,7 +39,7 @@ class Player:
     def seek(self, query: Mapping[str, str]) -> None:
         """Execute a command of the page's time line: "at" sets the position [s since the begin], "toggle" starts or pauses the replay.
 
-        Raises ValueError if "at" is not a number.
+        Raises ValueError if "at" is not a number. `query`: the command, a dict with one of these keys.
         """
         with self._lock:
             self._advance()
@@ -68,7 +68,8 @@ class Player:
 def replay(run: Path, port: int, report: Callable[[str], None]) -> None:
     """Serve the page of a recorded run until the user interrupts with Ctrl-C.
 
-    `run`: folder of the run. `report` is called with the page's address. Raises MobeeError if the record cannot be read.
+    `run`: folder of the run. `port`: TCP port of the page. `report` is called with the page's address. Raises MobeeError if the record
+    cannot be read.
     """
     story = Story(run)
     player, board = Player(story), Board()

@@ -51,16 +51,17 @@ class DriveServer:
         twin.on_alive(self._note_alive)
 
     def forget(self) -> None:
-        """Forget all owners and epochs, because a new run has begun."""
+        """Forget all owners and epochs (numbers of ownerships), because a new run has begun."""
         self._owners = dict.fromkeys(self._owners)
         self.epochs.update(dict.fromkeys(self.epochs, 0))
 
     def hold(self, part: str) -> None:
-        """Put a part in hold at robot_sim: it brakes and stands still.
+        """Stop a part: ask robot_sim to put it in hold, in which it brakes and stands still.
 
-        If the part has an owner, this client must arm it again; else any client may take it.
+        If a client owns the part, it remains the owner, and must call arm before the part moves again. If no client owns the part, it is
+        released at robot_sim, so that any client may take it. If this call fails, a warning is logged.
 
-        If robot_sim does not run, nothing is done, because it will start in hold and without owners.
+        If robot_sim does not run, nothing is done, because at its start all parts stand still and have no owners.
         """
         if not self._service.alive.get("robot_sim"):
             return

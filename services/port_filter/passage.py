@@ -96,8 +96,9 @@ class Streams:
     ) -> None:
         """Begin to forward states and commands.
 
-        `service`: client of the robot. `twin`: acts as the robot in the namespace of the clients. `epochs`: the drive epoch in force, by
-        part. `refusal`: returns the reason why clients may not command now; empty: they may. `mark`: called when a position move begins.
+        `service`: client of the robot. `twin`: acts as the robot in the namespace of the clients. `epochs`: dict from a part to the number
+        of the filter's present ownership of its drive. `refusal`: returns the reason why clients may not command now; empty: they may.
+        `mark`: called when a position move begins.
         """
         self._service, self._twin, self._robot = service, twin, robot
         self._epochs, self._refusal, self._mark = epochs, refusal, mark
@@ -130,7 +131,7 @@ class Streams:
         return self._q
 
     def follows(self, part: str) -> bool:
-        """Return whether the part is armed with the filter's epoch in the newest tick, so that it follows the filter's commands."""
+        """Return whether the filter owns the part and has armed it, by the newest tick, so that it follows the filter's commands."""
         state = self._parts.get(part)
         return state is not None and state.gate == "armed" and state.epoch == self._epochs[part]
 

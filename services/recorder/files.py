@@ -66,7 +66,8 @@ class Files:
     def write(self, channel: Channel, data: bytes, received: int, published: int, sequence: int = 0) -> None:
         """Add a message to a channel.
 
-        `received`, `published`: times of receipt and of publication, ns since 1970. `sequence`: number that the sender gave to the message.
+        `data`: content of the message. `received`, `published`: times of receipt and of publication, ns since 1970. `sequence`: number that
+        the sender gave to the message.
         """
         if self._file is None:
             self._begin()

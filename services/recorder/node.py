@@ -68,7 +68,7 @@ _header = msgspec.msgpack.Decoder(_Header)
 
 
 def sender_of(payload: bytes) -> tuple[str, int] | None:
-    """Return the name of the sender and the sequence number in a message's header; None if the header cannot be decoded.
+    """Return the name of the sender and the sequence number in the header of a message (`payload`); None if the header cannot be decoded.
 
     Such a message is recorded nevertheless.
     """
@@ -143,7 +143,7 @@ class RecorderNode:
             os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
 
     def end(self) -> None:
-        """Write the messages that have arrived and the index of the file."""
+        """Write the messages that have arrived, and the index, to the file of the recording."""
         self._receive_all()
         time.sleep(RECEIVING)
         try:

@@ -32,7 +32,8 @@ class BulletBackend:
     def __init__(self, robot: Robot, load_world: Callable[[], World], parameters: MotorParameters, seed: int, dt: float) -> None:
         """Build the robot and its world.
 
-        `load_world`: returns a new world. `seed`: of the encoder noise. `dt`: the tick, s. Raises BackendUnavailable or MobeeError.
+        `load_world`: returns a new world. `seed`: of the encoder noise. `dt`: the tick, s. Raises BackendUnavailable for a robot other than
+        the iCub, and MobeeError if a motor parameter or the world is invalid.
         """
         self._robot, self._load_world, self._parameters = robot, load_world, parameters
         self._substeps = parameters.substeps(dt)
@@ -56,7 +57,10 @@ class BulletBackend:
             self._find_contacts()
 
     def place(self, name: str, position: tuple[float, float, float]) -> None:
-        """Move a world object to a position (x, y, z) m, root frame; raises MobeeError."""
+        """Move a world object to a position (x, y, z) m, root frame.
+
+        Raises MobeeError if there is no such object, if it is attached to a link, or if a number is not finite.
+        """
         self.world.move(name, position=position)
         self._scene.move(name, position)
 
@@ -68,7 +72,7 @@ class BulletBackend:
         return SolidContact(self._deepest[pair], pair)
 
     def contacts(self) -> Mapping[str, float]:
-        """Return the largest depth [m] in the last tick of each solid contact, by pair: two sorted names with a blank between them."""
+        """Return a dict from each pair in solid contact ("NAME NAME", sorted) to the largest depth [m] in the last tick."""
         return self._deepest
 
     def gap(self) -> float:

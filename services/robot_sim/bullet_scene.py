@@ -134,7 +134,7 @@ class BulletScene:
                 self.client.setCollisionFilterPair(self.body, body, index, BASE, int((name, thing) in wanted))
 
     def distance(self, link: str, other: str, within: float) -> float:
-        """Return the distance [m] of a link from another link or a world object; negative if they overlap.
+        """Return the distance [m] of a link from `other`, a link or a world object; negative if they overlap.
 
         The result is infinite if the distance is larger than `within` [m].
         """

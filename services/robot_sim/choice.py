@@ -34,7 +34,8 @@ class Choice:
 def choose(backend: Literal["auto", Name], robot: Robot) -> Choice:
     """Return the back-end for a robot; raises BackendUnavailable if "pybullet" is given for a robot that it cannot move.
 
-    "auto" is PyBullet for the iCub if it is installed, otherwise MuJoCo if it is installed, otherwise the motor model alone ("kinematic").
+    `backend`: name of a back-end, or "auto". "auto" is PyBullet for the iCub if it is installed, otherwise MuJoCo if it is installed,
+    otherwise the motor model alone ("kinematic").
     """
     if backend == "pybullet":
         require_simulated(robot)

@@ -77,7 +77,7 @@ class Order(Struct, frozen=True, eq=False):
 
 
 def orders_of(commands: Commands, robot: Robot) -> dict[str, Order]:
-    """Return the orders in a `Commands` message, by part; raises KeyError for a part that the robot does not have."""
+    """Return a dict from a part to its order in a `Commands` message; raises KeyError for a part that the robot does not have."""
     reference = np.array(commands.ref)
     src, seq, re_k, ttl = commands.src, commands.seq, commands.re_k, commands.ttl
     return {
@@ -194,7 +194,7 @@ class Shaper:
         self._asked = Braking(limits.lower, limits.upper, limits.velocity, limits.acceleration * dt, dt)
 
     def start(self, q: Array, velocity: Array) -> None:
-        """Begin at the motors' measured positions `q` [rad] and velocities [rad/s], (n_part,) each."""
+        """Begin at the motors' measured positions `q` [rad] and `velocity` [rad/s], (n_part,) each."""
         self._asked.velocity[:] = np.clip(velocity, -self._limits.velocity, self._limits.velocity)
         self._asked.position[:] = q + self._asked.velocity / SERVO_GAIN  # by which the reference leads a servo at that speed
 
@@ -228,7 +228,7 @@ Report = Callable[[str, str, dict[str, float]], None]  # code, text, values
 
 
 class Drive(Struct, frozen=True, eq=False):
-    """Mode and reference of a part's motors in this tick.
+    """Kind of command (`mode`) and reference of a part's motors in this tick.
 
     `reference`: (n_part,) rad, rad/s or N m, by mode; None in hold, in which the part brakes and stands still.
     """
@@ -295,7 +295,7 @@ class Gate:
         self._last_position: tuple[Array, int] | None = None  # newest accepted position reference and its tick
 
     def take(self, who: str, instance: str) -> int:
-        """Set a new owner; return the new epoch. Later commands of the old owner are refused.
+        """Set a new owner of the part; return the epoch, the number of the new ownership. Later commands of the old owner are refused.
 
         `who`: name of the owner's service. `instance`: last chunk of its liveliness token.
         """
@@ -307,21 +307,33 @@ class Gate:
         return self.epoch
 
     def arm(self, epoch: int) -> None:
-        """Let the part follow commands from now on; raises Refused if the epoch is not in force, or the state is estop or fault."""
+        """Let the part follow the commands of its owner from now on.
+
+        `epoch`: number of the caller's ownership, which `take` returned. Raises Refused if the part has no owner, if the present ownership
+        has another number, or if the state is estop or fault.
+        """
         self._check_epoch(epoch)
         if self.state in ("estop", "fault"):
             raise Refused(self.state, f"{self.part} is in {self.state}: {_REMEDY[self.state]}")
         self.state = "armed"
 
     def release(self, epoch: int) -> None:
-        """End the ownership; raises Refused if the epoch is not in force."""
+        """End the ownership of the part, which then stands still until a client takes and arms it.
+
+        `epoch`: number of the ownership, which `take` returned. Raises Refused if the part has no owner, or if the present ownership has
+        another number.
+        """
         self._check_epoch(epoch)
         self.owner = None
         if self.state in ("hold", "armed"):
             self._enter("idle", "released")
 
     def hold(self, epoch: int) -> None:
-        """Put the part in hold (it brakes and stands still) at the request of its owner; raises Refused if the epoch is not in force."""
+        """Put the part in hold at the request of its owner: it brakes and stands still, and follows commands again only after `arm`.
+
+        `epoch`: number of the ownership, which `take` returned. Raises Refused if the part has no owner, or if the present ownership has
+        another number.
+        """
         self._check_epoch(epoch)
         self.force_hold("requested by its owner")
 

@@ -23,7 +23,7 @@ CHECK_PERIOD = 0.01  # s between two checks for an emergency stop; there is one 
 
 
 class Guard:
-    """The gates of all parts, one for each, and the emergency stop of all parts."""
+    """The safety gates, one for each part (the last check of commands before its motors), and the emergency stop of all parts."""
 
     def __init__(self, service: Service, robot: Robot, backend: Backend, dt: float, record: StopRecord | None, speed: float = 1.0) -> None:
         """Make the gates; an emergency stop in the record is in force from the beginning.
@@ -61,7 +61,7 @@ class Guard:
         self._on_answer = handler
 
     def reset(self) -> None:
-        """Begin a new run: all gates are idle and without owner. An emergency stop stays in force."""
+        """Begin a new run: all safety gates are idle and without owner. An emergency stop stays in force."""
         self.gates = {part: self._gate(part, gate.epoch) for part, gate in self.gates.items()}
         self._waiting.clear()
         self._runs.add(self._service.bus.run)

@@ -83,7 +83,10 @@ class Backend(Protocol):
         ...
 
     def place(self, name: str, position: tuple[float, float, float]) -> None:
-        """Move a world object to a position (x, y, z) m, root frame; raises MobeeError."""
+        """Move a world object to a position (x, y, z) m, root frame.
+
+        Raises MobeeError if there is no such object, if it is attached to a link, or if a number is not finite.
+        """
         ...
 
     def contact(self) -> SolidContact:
@@ -91,11 +94,11 @@ class Backend(Protocol):
         ...
 
     def contacts(self) -> Mapping[str, float]:
-        """Return the largest depth [m] in the last tick of each solid contact, by pair: two sorted names with a blank between them."""
+        """Return a dict from each pair in solid contact ("NAME NAME", sorted) to the largest depth [m] in the last tick."""
         ...
 
     def gap(self) -> float:
-        """Return the smallest distance of hands and forearms from the obstacles, m; -1 if it is not measured."""
+        """Return the present smallest distance of hands and forearms from the obstacles of the world, m; -1 if it is not measured."""
         ...
 
 
@@ -129,7 +132,10 @@ class KinematicBackend:
             motors.move(1, dt / substeps)
 
     def place(self, name: str, position: tuple[float, float, float]) -> None:
-        """Move a world object to a position (x, y, z) m, root frame; raises MobeeError."""
+        """Move a world object to a position (x, y, z) m, root frame.
+
+        Raises MobeeError if there is no such object, if it is attached to a link, or if a number is not finite.
+        """
         self.world.move(name, position=position)
 
     def contact(self) -> SolidContact:

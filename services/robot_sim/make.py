@@ -19,7 +19,8 @@ def make_backend(config: Config, robot: Robot) -> Backend:
     """Return the back-end that the configuration names.
 
     If the setting `record` names a folder, the back-end also writes the true joint positions and the contacts of every tick there. Raises
-    BackendUnavailable or MobeeError.
+    BackendUnavailable if the back-end is not installed or cannot simulate the robot, and MobeeError if a setting of the motors, the world
+    or the folder is invalid.
     """
     backend = _make_backend(config, robot)
     return Recorded(backend, Path(config.record)) if config.record else backend

@@ -35,7 +35,8 @@ class MujocoBackend:
     def __init__(self, robot: Robot, load_world: Callable[[], World], parameters: MotorParameters, seed: int, dt: float) -> None:
         """Build the robot and its world.
 
-        `load_world`: returns a new world. `seed`: of the encoder noise. `dt`: the tick, s. Raises MobeeError.
+        `load_world`: returns a new world. `seed`: of the encoder noise. `dt`: the tick, s. Raises MobeeError if a motor parameter or the
+        world is invalid.
         """
         self._robot, self._load_world, self._parameters = robot, load_world, parameters
         self._substeps = parameters.substeps(dt)
@@ -84,9 +85,10 @@ class MujocoBackend:
                     self._deepest[name] = max(depth, self._deepest.get(name, 0.0))
 
     def place(self, name: str, position: tuple[float, float, float]) -> None:
-        """Move a world object to a position (x, y, z) m, root frame; raises MobeeError.
+        """Move a world object to a position (x, y, z) m, root frame.
 
-        A movable object is then at rest, with the orientation in the world's file.
+        A movable object is then at rest, with the orientation in the world's file. Raises MobeeError if there is no such object, if it is
+        attached to a link, or if a number is not finite.
         """
         self._world.move(name, position=position)
         self._scene.move(name, position)
@@ -104,7 +106,7 @@ class MujocoBackend:
         return SolidContact(self._deepest[pair], pair)
 
     def contacts(self) -> Mapping[str, float]:
-        """Return the largest depth [m] in the last tick of each solid contact, by pair: two sorted names with a blank between them."""
+        """Return a dict from each pair in solid contact ("NAME NAME", sorted) to the largest depth [m] in the last tick."""
         return self._deepest
 
     def gap(self) -> float:

@@ -259,7 +259,7 @@ def _share(amount: float, motor: Motor, scale: float) -> float:
 
 
 def touching_at_home(robot: Robot, world: World) -> dict[frozenset[str], float]:
-    """Return the depth [m] of each pair of solids that the model finds in contact at home, by the set of their two names."""
+    """Return a dict from each pair of solids (set of two names) that the model finds in contact at home to the depth [m]."""
     contacts = Model(robot, world).evaluate(robot.home).contacts
     return {frozenset((one.first, one.second)): one.depth for one in contacts if one.kind == "solid"}
 

@@ -37,8 +37,9 @@ def joint_name(joint: int) -> str:
 def add_tree(spec: Any, robot: Robot, weigh: Callable[[Any, int, Array], None]) -> tuple[list[Any], Array]:
     """Add a body for each link of the robot, and its joint, to a MuJoCo specification.
 
-    Returns the bodies, and the origins (L, 3) m of their frames in the root frame at zero pose. The axes of all frames are those of the
-    root frame at zero pose. `weigh(body, link, origin)`: called for each link, to give its body a mass.
+    `spec`: the specification (mujoco.MjSpec). Returns the bodies, and the origins (L, 3) m of their frames in the root frame at zero pose.
+    The axes of all frames are those of the root frame at zero pose. `weigh(body, link, origin)`: called for each link, to give its body a
+    mass.
     """
     bodies = [spec.worldbody.add_body(name=link_name(0))]
     origins = [np.zeros(3)]
@@ -55,7 +56,7 @@ def add_tree(spec: Any, robot: Robot, weigh: Callable[[Any, int, Array], None]) 
 def add_volume(spec: Any, body: Any, name: str, volume: Shape | WorldObject, position: Array) -> Any:
     """Add a volume to a body as a geom with the given name; return the geom.
 
-    `position`: (3,) m, centre of the volume in the body's frame.
+    `spec`: the MuJoCo specification. `position`: (3,) m, centre of the volume in the body's frame.
     """
     size = np.zeros(3)
     size[: len(volume.size)] = volume.size

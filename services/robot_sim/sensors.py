@@ -83,7 +83,7 @@ class Sensors:
 
     @property
     def hash(self) -> str:
-        """SHA-256, in lockstep, over q, dq, mode and gate of every part at every tick from 1 on."""
+        """SHA-256, in lockstep (every tick waits for all participants), over q, dq, mode and gate of every part at every tick from 1 on."""
         return self._hash.hexdigest()
 
     def begin(self, motors: Motors) -> None:
@@ -94,7 +94,7 @@ class Sensors:
         """Read parts at their times in this tick, by interpolation between its start (`begin`) and its end, with encoder noise.
 
         `shares`: pairs of the share of the tick (0 to 1) and the part. Velocities are those of the motors. The readings of each part, a
-        sample, are published on `{part}/state`.
+        sample, are published on `{part}/state`. `gates`: the safety gate of each part, whose state is published, too.
         """
         q, dq, tau = motors.q, motors.motor_velocities, motors.efforts
         noise = motors.encoders(self._bus.k, self._dt) - q
@@ -118,7 +118,7 @@ class Sensors:
     def sample_now(self, motors: Motors, gates: Mapping[str, Gate]) -> None:
         """Read all parts as they are now, at the beginning of the tick, and publish the readings on `{part}/state`.
 
-        Tick 0, in which nothing moves, is read without noise.
+        Tick 0, in which nothing moves, is read without noise. `gates`: the safety gate of each part, whose state is published, too.
         """
         k = self._bus.k
         self._q = motors.encoders(k, self._dt) if k else motors.q

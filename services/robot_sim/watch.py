@@ -91,7 +91,7 @@ class Counters:
     def count_gates(self, gates: Iterable[Gate]) -> None:
         """Count the tick, the age of its oldest command, and whether all owned parts follow commands or one is in hold.
 
-        A part in hold brakes and stands still. Call this once per tick.
+        `gates`: the safety gates of all parts. A part in hold brakes and stands still. Call this once per tick.
         """
         self.ticks += 1
         owned = [gate for gate in gates if gate.state != "idle"]
@@ -116,7 +116,7 @@ class Counters:
             self.gap_min = gap
 
     def age_at(self, percent: float) -> float:
-        """Return a percentile (0 to 100) of the age of commands, in ticks; -1 before the first command."""
+        """Return the percentile `percent` (0 to 100) of the age of commands, in ticks; -1 before the first command."""
         total, seen = sum(self.ages.values()), 0
         for age in sorted(self.ages):
             seen += self.ages[age]
@@ -201,7 +201,7 @@ class Recorded:
         self._begin()
 
     def place(self, name: str, position: tuple[float, float, float]) -> None:
-        """Move a world object of the recorded back-end to a position (x, y, z) m, root frame; raises MobeeError."""
+        """Move a world object of the recorded back-end to a position (x, y, z) m, root frame; raises as its `place` does."""
         self._inner.place(name, position)
 
     def contact(self) -> SolidContact:
@@ -209,11 +209,14 @@ class Recorded:
         return self._inner.contact()
 
     def contacts(self) -> Mapping[str, float]:
-        """Return the largest depth [m] in the last tick of each solid contact, by pair: two sorted names with a blank between them."""
+        """Return a dict from each pair in solid contact ("NAME NAME", sorted) to the largest depth [m] in the last tick."""
         return self._inner.contacts()
 
     def gap(self) -> float:
-        """Return the smallest distance of hands and forearms from the obstacles, m; -1 if it is not measured."""
+        """Return the present smallest distance of hands and forearms from the obstacles, m, measured by the recorded back-end.
+
+        -1 if there are no obstacles, or if that back-end does not measure the distance.
+        """
         return self._inner.gap()
 
     def _begin(self) -> None:
@@ -248,7 +251,7 @@ class Watch:
         self.counters.stops.forget()
 
     def measure(self) -> None:
-        """Count gates, contacts and stops; call this once per tick, after the physics.
+        """Count the states of the safety gates, contacts and stops; call this once per tick, after the physics.
 
         If the physics gives positions that are not finite, all gates enter the state fault.
         """

@@ -79,8 +79,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
     """Measure the throughput for each robot, from where the run in `folder` was stopped; with --check, run the endurance test instead.
 
-    Returns the rates of evaluations and edits by robot, as in `results`; with --check the counts and "passed" of the endurance test, as in
-    `model_throughput_endurance.endure`.
+    Returns a dict from the robot to the rates of evaluations and edits, as in `results`; with --check the counts and "passed" of the
+    endurance test, as in `model_throughput_endurance.endure`.
     """
     if arguments.check:
         return endure(folder, threads=arguments.threads, duration=arguments.duration or ENDURANCE_SECONDS, seed=arguments.seed)

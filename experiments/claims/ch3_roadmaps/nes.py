@@ -59,9 +59,9 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Search for the minimum of a test function with one strategy, and return how long it took.
 
-    `settings`: name of the strategy and of the function, number of dimensions, and the limit "most" of evaluations.  Keys of the result:
-    "evaluations", the number needed, at most "most"; "found", whether the minimum was found; "us", own processor time of the strategy per
-    evaluation [us].
+    `settings`: name of the strategy and of the function, number of dimensions, and the limit "most" of evaluations.  `seed`: of the random
+    numbers.  Keys of the result: "evaluations", the number needed, at most "most"; "found", whether the minimum was found; "us", own
+    processor time of the strategy per evaluation [us].
     """
     most = settings["most"]
     evaluations, us = search(settings["strategy"], settings["function"], settings["dimensions"], seed, most)

@@ -61,6 +61,7 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Solve the inverse kinematics of the targets of this seed, one after another, with the solver and motors that the settings name.
 
     Returns arrays (targets,): "reached", whether a pose was found; "evaluations", number of evaluations of the model; "ms", processor time.
+    `settings`: "solver", its name; "motors", a key that says which motors may move; "targets", their number.
     """
     model, name, count = _model(), settings["solver"], settings["targets"]
     motors = MOTORS if settings["motors"] == FEW else None

@@ -10,7 +10,8 @@ shorter through the ball than over it.  The real processes run with PyBullet (wi
 ms and the default law at full speed.  Each crossing begins with a new map; 0.1 to 1.2 s after its start the ball becomes an obstacle in the
 model, and a body in the simulator.  Bump: the first tick at which the model reports contact of the arm with the ball, fields included; the
 motion ends there, the edge is removed, and the arm moves on to the next vertex of the new path at once.  Under way: the first tick in which
-a command computed after the new goal is in force.  Also measured: when the joints stop approaching the old goal, which depends on the law.
+a command computed after the new goal is in force.  Also measured: when the joints stop approaching the old goal, which depends on the
+control law.
 """
 
 from __future__ import annotations
@@ -311,7 +312,8 @@ def _motion(q: Array, times: Array, solid: float) -> Motion:
 def plot_times(crossings: Sequence[Measures]) -> Any:
     """Return a figure of the distributions of two times [ms] after the bump.
 
-    They are the time until a command of the new path is in force, and until the joints stop approaching the old goal.
+    They are the time until a command of the new path is in force, and until the joints stop approaching the old goal.  `crossings`: the
+    measures of each crossing.
     """
     drawing = new_figure(6.0, 3.4)
     axes = drawing.subplots()

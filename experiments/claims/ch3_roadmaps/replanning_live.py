@@ -165,7 +165,7 @@ class Crosser:
         return outcome
 
     def cross(self, after: float) -> Crossing:
-        """Move from the right of the ball to its left on a new map.  `after`: time [s] from the start until the ball becomes solid."""
+        """Move from the right of the ball to its left on a new roadmap.  `after`: time [s] from the start until the ball becomes solid."""
         self.turn(solid=False)
         walker = Walker(new_map(), self, back=False)
         walker.go(RIGHT)
@@ -240,7 +240,7 @@ class ContactStopPlant(BusPlant):
         return super().act(part, target)
 
     def leave(self) -> None:
-        """Release all goals and, in lockstep, end the participation of both services."""
+        """Release all goals and, in lockstep (every tick waits for all participants), end the participation of both services."""
         super().leave()
         if self._watcher is not None:
             self._watcher.done(max(self._watched, 0), last=True)

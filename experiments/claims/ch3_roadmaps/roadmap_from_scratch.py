@@ -80,7 +80,7 @@ def model() -> Model:
 
 
 def joints() -> tuple[str, ...]:
-    """Return the names of the seven motors of the right arm in which the poses of the map differ."""
+    """Return the names of the seven motors of the right arm in which the poses of the roadmap differ."""
     return robot().parts[PART].motors[:JOINTS]
 
 
@@ -99,7 +99,7 @@ def offline_plant(seed: int) -> OfflinePlant:
 
 
 def explorer(plant: Plant, seed: int, store: MapStore | None = None) -> MapExplorer:
-    """Return an explorer of the map of this seed, which moves `plant`.
+    """Return an explorer of the roadmap of this seed, which moves `plant`.
 
     It repairs the map with paths of single-query planning (RRT-Connect) that avoid the table.  `store`: file of the observations; None: not
     stored.
@@ -127,7 +127,7 @@ class Depth:
 
 
 def explored(seed: int, most: int | None = None) -> dict[str, Any]:
-    """Explore the map of a seed on the offline plant, with at most `most` motions along edges (None: until all are known).
+    """Explore the roadmap of a seed on the offline plant, with at most `most` motions along edges (None: until all are known).
 
     Returns the map and its observations with the keys of `outcome`, and: "finished", whether all is known; "why", the text of the error
     that ended the exploration, "" without one; "minutes", robot time [min] at the end of each motion; "deepest", depth [m] of the deepest
@@ -177,7 +177,7 @@ def agreement(roadmap: AdaptiveRoadmap, seed: int) -> Array:
 
 
 def perform(service: Service, folder: Path) -> None:
-    """Explore the map of the job in `folder` on the live robot, until it is finished or the job's number of tries is made.
+    """Explore the roadmap of the job in `folder` on the live robot, until it is finished or the job's number of tries is made.
 
     Observations are stored at once, so a stopped exploration can be continued.
     """
@@ -211,17 +211,20 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return the only condition of the sweep: the exploration of a map for each seed.  With --quick: at most 30 edges."""
+    """Return the only condition of the sweep: the exploration of a roadmap for each seed.  With --quick: at most 30 edges."""
     return [Condition("quick-map" if arguments.quick else "map", {"most": QUICK if arguments.quick else None})]
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Explore the map of this seed offline, and return the map and its measures, as in `explored`."""
+    """Explore the roadmap of this seed offline, and return the map and its measures, as in `explored`.
+
+    `settings`: "most", the largest number of tries; None: no limit.
+    """
     return explored(seed, settings["most"])
 
 
 def explore_live(folder: Path, seed: int, most: int | None) -> None:
-    """Explore the map of a seed on the live robot, or continue an exploration that was stopped.
+    """Explore the roadmap of a seed on the live robot, or continue an exploration that was stopped.
 
     `folder`: has the store of the observations, and a folder for the recording of each launch.  `most`: largest number of tries; None: no
     limit.  Nothing is done if the exploration is finished.
@@ -249,7 +252,7 @@ def _touched(launches: Sequence[Path]) -> dict[str, Any]:
 
 
 def read_live(folder: Path) -> dict[str, Any] | None:
-    """Return the map and the measures of the live exploration in `folder`; None if it is not finished.
+    """Return the roadmap and the measures of the live exploration in `folder`; None if it is not finished.
 
     Keys: those of `outcome`; "finished", whether all edges are known; "hours", robot time; "touches", solid contacts; "deepest", depth [m]
     of the deepest one, and "pair", the names of its shapes; "agree" (E,), for each tried edge whether another try on the offline plant had
@@ -265,7 +268,7 @@ def read_live(folder: Path) -> dict[str, Any] | None:
 
 
 def unreached(values: Mapping[str, Any]) -> int:
-    """Return how many of the random samples of a map were never reached.  `values`: the result of `explored` or `read_live`."""
+    """Return how many of the random samples of a roadmap were never reached.  `values`: the result of `explored` or `read_live`."""
     goals, feasible = values["goals"], values["feasible"]
     reached = np.zeros(len(goals), dtype=bool)
     reached[goals[feasible]] = True
@@ -276,9 +279,9 @@ def unreached(values: Mapping[str, Any]) -> int:
 def findings(found: Cells, live: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """Return the results of all cells (explorations, one for each seed) and of the live exploration.
 
-    Keys: "maps", a dict from "seed N" or "live" to a row of the map: minutes of robot time, numbers of edges, repairs and unreached samples
-    (poses of vertices), deepest solid contact, and others; "claims", a list with the judged claims, as dicts (`Claim.record`).  `live`: the
-    result of `read_live`; None: not explored live.
+    Keys: "maps", a dict from "seed N" or "live" to a row of the roadmap: minutes of robot time, numbers of edges, repairs and unreached
+    samples (poses of vertices), deepest solid contact, and others; "claims", a list with the judged claims, as dicts (`Claim.record`).
+    `live`: the result of `read_live`; None: not explored live.
     """
     results = sorted(found.values(), key=lambda result: result.cell.seed)
     rows = {f"seed {result.cell.seed}": _row(result.values) for result in results}
@@ -357,7 +360,7 @@ CLAIMS = (known, gaps, repeatable, harmless)
 
 
 def plot(found: Cells, live: Mapping[str, Any] | None = None) -> Any:
-    """Return a figure with three panels: the map before exploration, the explored map, and the number of motions along edges over time.
+    """Return a figure with three panels: the roadmap before exploration, the explored map, and the number of motions along edges over time.
 
     `live`: the live exploration, whose map is then drawn; None: the map of the first seed is drawn.
     """
@@ -415,7 +418,7 @@ SWEEP = Sweep(conditions, trial, findings, plot, add_options=add_options, requir
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Explore the maps that are not in `folder` yet; with --live also the first seed's map on the live robot.  Returns the results."""
+    """Explore the roadmaps that are not in `folder` yet; with --live also the first seed's map on the live robot.  Returns the results."""
     SWEEP.run(arguments, folder)
     if arguments.live:
         explore_live(folder / "live", arguments.seed, QUICK if arguments.quick else None)
@@ -425,13 +428,13 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 def results(folder: Path) -> dict[str, Any]:
     """Compute the results from the finished cells in `folder` and its live exploration if there is one, as `findings` returns them.
 
-    Keys: "maps", a dict from the name of a map to a row of numbers; "claims", a list with the judged claims, as dicts (`Claim.record`).
+    Keys: "maps", a dict from the name of a roadmap to a row of numbers; "claims", a list with the judged claims, as dicts (`Claim.record`).
     """
     return findings(load_cells(folder), read_live(folder / "live"))
 
 
 def figure(folder: Path) -> Path:
-    """Draw the maps of the run in `folder` to a file.  Returns its path; raises InvalidValue if there is no map."""
+    """Draw the roadmaps of the run in `folder` to a file.  Returns its path; raises InvalidValue if there is no map."""
     found = load_cells(folder)
     if not found:
         raise InvalidValue(f"{folder} has no finished cells: the run was stopped before the first.")

@@ -54,7 +54,7 @@ MAX_OFFSET = 0.05  # of a pose from such a point, in spacings
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Coverage:
-    """How well the vertices of a map cover the task space.
+    """How well the vertices of a roadmap cover the task space.
 
     `reachable`: task points (R, m) that the robot can reach.  `far`: (R,) distance of each from its nearest vertex, in spacings.
     """
@@ -85,10 +85,10 @@ def reachable(
 ) -> Array:
     """Return a dense set of task points that the robot can reach, (R, m).
 
-    Most points are found by least squares on a lattice of half the spacing, with many more starts per point than a map uses.  Others are
-    found by random starts at random points, which do not depend on neighbours.  `costs`: what each pose must satisfy.  `spacing`: of the
-    map, (m,).  `motors`: those that may move, None: all.  `start`: pose (n,) rad of the other motors, None: home.  `margin`: distance [rad]
-    of the poses from the motors' limits.  `seed`: of the random numbers.
+    Most points are found by least squares on a lattice of half the spacing, with many more starts per point than a roadmap uses.  Others
+    are found by random starts at random points, which do not depend on neighbours.  `costs`: what each pose must satisfy.  `spacing`: of
+    the map, (m,).  `motors`: those that may move, None: all.  `start`: pose (n,) rad of all motors, at which the other motors stay; None:
+    home.  `margin`: distance [rad] of the poses from the motors' limits.  `seed`: of the random numbers.
     """
     rng = np.random.default_rng(seed)
     problem = Problem(model, costs, start, motors, margin)
@@ -97,7 +97,7 @@ def reachable(
 
 
 def coverage(points: Array, y: Array, spacing: Array) -> Coverage:
-    """Return how well the vertices `y` (V, m) of a map cover reachable task points.
+    """Return how well the vertices `y` (V, m) of a roadmap cover reachable task points.
 
     `points`: (R, m) task points; the vertices are added.  `spacing`: of the map, (m,).
     """
@@ -170,7 +170,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def cells(arguments: argparse.Namespace) -> list[Cell]:
-    """Return the cells (pieces of work): for each task one for the reachable part, and one for each map (method and seed).
+    """Return the cells (pieces of work): for each task one for the reachable part, and one for each roadmap (method and seed).
 
     With --quick: three small tasks.
     """
@@ -187,7 +187,7 @@ def cells(arguments: argparse.Namespace) -> list[Cell]:
 
 
 def work(cell: Cell) -> dict[str, Any]:
-    """Do the work of one cell: build and measure a map, or find the task points that the robot can reach.
+    """Do the work of one cell: build and measure a roadmap, or find the task points that the robot can reach.
 
     Returns the map and its measures with the keys of `built`, or the reachable task points (R, m) under "points".
     """
@@ -199,7 +199,7 @@ def work(cell: Cell) -> dict[str, Any]:
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Build the maps that are not in `folder` yet, write the measures of all maps there, and return the results.
+    """Build the roadmaps that are not in `folder` yet, write the measures of all maps there, and return the results.
 
     Raises NotInstalled without python-fcl.
     """
@@ -215,7 +215,7 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 def results(folder: Path) -> dict[str, Any]:
     """Compute the results of all maps from the file of measures in `folder`, as `findings` returns them.
 
-    Keys: "maps", the measures of the maps, as text; "claims", a list with the judged claims, as dicts (`Claim.record`).
+    Keys: "maps", the measures of the roadmaps, as text; "claims", a list with the judged claims, as dicts (`Claim.record`).
     """
     measures = json.loads((folder / MEASURES).read_text())
     return findings(
@@ -228,11 +228,11 @@ def results(folder: Path) -> dict[str, Any]:
 
 
 def built(example: Example, method: Method, seed: int) -> dict[str, Any]:
-    """Build a map with this method ("nes" or "least_squares"), and return its measures and the map itself.
+    """Build the roadmap of an example with this method ("nes" or "least_squares"), and return its measures and the map itself.
 
     Measures: "vertices" and "evaluations", numbers; "processor_s" and "wall_s"; "valid", share of valid poses; "kept", number of edges over
     the number of edges to nearest neighbours; "free", share of edges without contact; "connected", share of vertices in the largest
-    component.  The map: "q" (V, n) rad, "y" (V, m), "edges" (E, 2) and "spacing" (m,).
+    component.  The map: "q" (V, n) rad, "y" (V, m), "edges" (E, 2) and "spacing" (m,).  `seed`: of the search.
     """
     start, wall = time.process_time(), time.perf_counter()
     roadmap = build(example, method, seed)
@@ -275,7 +275,7 @@ def findings(runs: Runs) -> dict[str, Any]:
 
 
 def maps(found: Cells) -> Runs:
-    """Return the measures of the maps by (task, method): dicts from the name of a measure to its values (seeds,).
+    """Return the measures of the roadmaps by (task, method): dicts from the name of a measure to its values (seeds,).
 
     The names (COLUMNS) are "vertices"; "processor_s"; "evaluations_a_vertex"; "coverage", the share of the reachable task points within a
     spacing of a vertex; "largest_hole", in spacings; "valid", "kept", "free" and "connected" as in `built`.  "coverage" and "largest_hole"
@@ -300,7 +300,7 @@ def are_complete(runs: Runs) -> bool:
 
 @claim("thesis 3.4, figs. 3.1-3.11", f"maps for all 13 tasks: at least {COVERED:.0%} of the reachable task space covered", "figures only")
 def maps_of_all(runs: Runs) -> Measured:
-    """Judge whether the maps of all tasks of the thesis' figures cover at least 95 % (COVERED) of the reachable task points.
+    """Judge whether the roadmaps of all tasks of the thesis' figures cover at least 95 % (COVERED) of the reachable task points.
 
     Returns the smallest coverages as text, and the verdict, which depends only on the maps by evolution, the method of the thesis.
     """

@@ -112,7 +112,7 @@ def _moving_parts(example: Example) -> tuple[str, ...]:
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Build and draw the maps of the tasks on the command line; a map file that exists already in the folder is read instead.
+    """Build and draw the roadmap of each task that the command line names; a roadmap with a file in the folder of --out is read instead.
 
     `argv`: command-line arguments; None: those of the process.  Raises SystemExit with the text of an error of the library.
     """
@@ -130,7 +130,7 @@ def main(argv: Sequence[str] | None = None) -> None:
 
 
 def draw_all(tasks: Sequence[str], method: Method, seed: int, out: Path) -> None:
-    """Build and draw the map of every task, and print a line for each; with several tasks also draw sheets with all of them.
+    """Build and draw the roadmap of every task, and print a line for each; with several tasks also draw sheets with all of them.
 
     `tasks`: keys of EXAMPLES.  `method`: how poses are searched, "least_squares", "nes" or "hybrid".  `seed`: of the maps.  `out`: folder
     of all files.

@@ -76,10 +76,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Run the trials that are not in `folder` yet, and return the results.
+    """Run the trials that are not in `folder` yet, and return the results of all trials.
 
-    Keys: "judged", whether each claim holds, by its text; "passed", whether all hold; with --json also "modes", the result of `summarise`
-    by mode.  Without --json a table is printed.
+    Keys: "judged", a dict from the text of each claim to whether it holds; "passed", whether all claims hold; with --json also "modes", a
+    dict from the mode to the measurements that `summarise` returns.  Modes: "off" (without MoBeE), "one" (MoBeE 1.0), "two" (MoBeE 2.0).
+    Without --json a table is printed.  Raises TrialFailed if this machine is too busy for a trial.
     """
     robot = load_robot(ROBOT)
     lengths = trial_lengths(arguments.minutes, arguments.trial)
@@ -133,7 +134,7 @@ def read_trials(folder: Path, mode: str) -> list[Trial]:
 
 
 def summarise(trials: Sequence[Trial]) -> dict[str, Any]:
-    """Return the numbers of one mode over all its trials.
+    """Return the numbers of one mode (without MoBeE, MoBeE 1.0 or MoBeE 2.0) over all its trials.
 
     Main keys: "collisions", number of solid contacts; "deepest_mm", depth of the deepest one; "pairs", dict from a pair of shapes to its
     number of contacts; "commands", number of commands to a part; "completed", "deflected" and "returned", how many commands had this
@@ -178,9 +179,9 @@ def summarise(trials: Sequence[Trial]) -> dict[str, Any]:
 
 
 def verdict(rows: Rows) -> dict[str, bool]:
-    """Return whether each claim holds, by its text.  A claim is absent if the modes that it compares were not run.
+    """Return a dict from the text of each claim to whether it holds.  A claim is absent if the modes that it compares were not run.
 
-    `rows`: results of `summarise`, by mode.
+    `rows`: a dict from the mode ("off", "one", "two": without MoBeE, MoBeE 1.0, MoBeE 2.0) to the result of `summarise`.
     """
     claims: dict[str, bool] = {}
     off, one, two = (rows.get(mode) for mode in ("off", "one", "two"))
@@ -218,7 +219,10 @@ def _mean(values: Sequence[float]) -> float | None:
 
 
 def depth_histogram(events: Iterable[Touch]) -> dict[str, int]:
-    """Return the number of contacts in each range of depth.  The keys are the ranges in mm, as text."""
+    """Return the number of contacts in each range of depth.  The keys are the ranges in mm, as text.
+
+    `events`: the contacts.
+    """
     depths = [1e3 * event.depth for event in events]
     bounds = (0.0, *EDGES, float("inf"))
     labels = [f"<{EDGES[0]:g}", *(f"{low:g}-{high:g}" for low, high in zip(EDGES, EDGES[1:], strict=False)), f">{EDGES[-1]:g}"]
@@ -226,7 +230,10 @@ def depth_histogram(events: Iterable[Touch]) -> dict[str, int]:
 
 
 def as_table(rows: Rows) -> str:
-    """Return the results as a text table with a column for each mode.  `rows`: results of `summarise`, by mode."""
+    """Return the results as a text table with a column for each mode.
+
+    `rows`: a dict from the mode ("off", "one", "two": without MoBeE, MoBeE 1.0, MoBeE 2.0) to the result of `summarise`.
+    """
     lines = [_line("", [TITLES[mode] for mode in rows])]
 
     def add(label: str, text: Mapping[str, str]) -> None:
@@ -295,7 +302,7 @@ def figure(folder: Path) -> Path:
 def plot(rows: Rows) -> Any:
     """Return a figure of collisions by pair and by depth, of the outcomes of the commands, and of the roughness of the motion.
 
-    `rows`: results of `summarise`, by mode.
+    `rows`: a dict from the mode ("off", "one", "two": without MoBeE, MoBeE 1.0, MoBeE 2.0) to the result of `summarise`.
     """
     drawing = new_figure(11.0, 7.5)
     axes = drawing.subplots(2, 2)

@@ -88,7 +88,7 @@ class CommandLog:
         self._file: TextIO = path.open("w", buffering=1)
 
     def note(self, commanded: Commanded) -> None:
-        """Append a command that has ended to the file."""
+        """Append a command that has ended to the file of commands."""
         self._file.write(encoded(commanded) + "\n")
 
 
@@ -151,7 +151,7 @@ Outcome = Literal["completed", "deflected", "returned"]
 def scenario(mode: str, folder: Path, seed: int, backend: str = PHYSICS[0]) -> str:
     """Return the text of a scenario for one trial; the system writes its recordings into `folder`.
 
-    `mode`: "off" (without MoBeE), "one" (MoBeE 1.0) or "two" (MoBeE 2.0).  `backend`: physics engine of the robot.
+    `mode`: "off" (without MoBeE), "one" (MoBeE 1.0) or "two" (MoBeE 2.0).  `backend`: physics engine of the robot.  `seed`: of the run.
     """
     where = _quoted(folder)
     gains = 'gains = "default"' if mode == "two" else ""

@@ -81,6 +81,8 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Run all variants ("off", "naive", "mended", "2.0") at one spot and one angle, each several times with different encoder noise.
 
     Returns a dict with the key "trials": a list of dicts with the fields of `Trial`.  It is empty if the hand has no path at this angle.
+    `settings`: "spot", number of the spot; "spots", how many are drawn; "angle" [deg]; "repeat", number of repetitions.  `seed`: of the
+    spots and the noise.
     """
     table, spot, angle = _table(), settings["spot"], settings["angle"]
     path = table.path(_spots(settings["spots"], seed)[spot], np.deg2rad(angle))

@@ -78,7 +78,8 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Let both robots babble under a protection, and return the times, contacts and counts of reflexes.
 
-    The keys are those of `shared_workspace_trial.run_trial`.
+    The keys are those of `shared_workspace_trial.run_trial`.  `settings`: "protection", "minutes" and "paces", the arguments of that
+    function.  `seed`: of postures and encoder noise.
     """
     return run_trial(settings["protection"], settings["minutes"], settings["paces"], seed)
 

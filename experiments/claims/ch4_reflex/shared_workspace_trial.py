@@ -201,7 +201,7 @@ class Truth:
 
 
 def is_between(first: str, second: str) -> bool:
-    """Whether a contact of two shapes, given by their names, is one between the two robots.  Objects of the world belong to no robot."""
+    """Whether a contact of shapes `first` and `second` (names) is one between the two robots.  Objects of the world belong to no robot."""
     shapes = {shape.name for shape in two_robots().shapes}
     return second in shapes and first.startswith(MARK) != second.startswith(MARK)
 

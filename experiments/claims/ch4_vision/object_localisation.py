@@ -135,7 +135,7 @@ class Robot:
     def arrange(self, about: Array) -> dict[str, tuple[Array, float]]:
         """Put all things side by side around a position `about` (3,) m, root frame, at the height of the table or above it.
 
-        Returns the position (3,) m and the angle [rad] of each thing, by name.
+        Returns a dict from the name of each thing to its position (3,) m and angle [rad].
         """
         found: dict[str, tuple[Array, float]] = {}
         top = max(item.position[2] + 0.5 * item.size[2] for item in self._solids)
@@ -173,7 +173,8 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     normalised by the covariance that the robot computes; "NAME_size" (N, g), relative errors of its g sizes.  "box_angle" (N,) rad: error
     of the box's angle.  Numbers: "shown", gazes at things; "taken_for_another", places more than 5 cm wrong; "looks", pairs of pictures of
     the empty table; "false_objects" and "false_places", what the tracker and single looks reported there; "false_regions", detected regions
-    per picture there; "detector_ms", processor time per picture.
+    per picture there; "detector_ms", processor time per picture.  `settings`: "world", its name; "postures" of the calibration, "gazes" at
+    things, "looks" at the empty table, their numbers; "detector", its name (optional).  `seed`: of everything random.
     """
     robot = Robot(settings["world"], settings["postures"], seed, settings.get("detector", COLOR))
     return {**_with_things(robot, settings["gazes"]), **_without(robot, settings["looks"])}

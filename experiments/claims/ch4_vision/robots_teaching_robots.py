@@ -78,7 +78,8 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
     Main keys: "errors, NAME", distances (N,) m of the computed from the true positions, for stereo and each localiser; "curves", dict from
     a localiser to its median errors [m], one for each number of lessons in "counts"; "held_out", number of lessons for the test;
-    "reported", median error [m] of the positions that the Katana reports; "robot_seconds", robot time of the teaching [s].
+    "reported", median error [m] of the positions that the Katana reports; "robot_seconds", robot time of the teaching [s].  `settings`:
+    "poses" of the Katana, "looks" at each, and "postures" of the calibration for stereo, their numbers.  `seed`: of everything random.
     """
     lessons, time = taught(settings["poses"], settings["looks"], seed)
     learned, held_out = split_by_pose(lessons.poses, HELD_OUT, seed)

@@ -90,7 +90,10 @@ class Search:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Run one search, and return its final state as a dict with the fields of `Search`."""
+    """Run one search, and return its final state as a dict with the fields of `Search`.
+
+    `settings`: "gains", "forced" and "tries", the arguments of `search`.  `seed`: of the random commands.
+    """
     return asdict(search(settings["gains"], settings["forced"], settings["tries"], seed))
 
 
@@ -98,7 +101,7 @@ def search(gains: str, forced: bool, tries: int, seed: int) -> Search:
     """Search for large violations: first by random tries, then by variations of the worst commands of each clause.
 
     `gains`: name of the gain set.  `forced`: whether a client pushes.  `tries`: number of tries to make; both arms try at once, so if it is
-    odd, the last run counts for the left arm only.  Returns the final state.
+    odd, the last run counts for the left arm only.  Returns the final state.  `seed`: of the random commands.
     """
     state, numbers = Search(gains, forced, seed), Gains.named(gains)
     while state.tries < tries:

@@ -110,7 +110,7 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Press into the wall, or pull the hand to the target, that the settings name.
 
     For a wall: {"pressed": the result of `press`}.  For a target: "drawn", "times" (T,) s and "distances" (T,) m, the results of
-    `draw_hand`.
+    `draw_hand`.  `settings`: "gains" and either "wall" and "levels" or "target", the arguments of these functions.  `seed`: of the plant.
     """
     if "wall" in settings:
         return {"pressed": press(settings["gains"], settings["wall"], settings["levels"], seed)}
@@ -121,7 +121,8 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 def press(gains: str, wall: str, levels: Sequence[float], seed: int) -> list[Record]:
     """Push the robot from home with one level of force after the other, and return a record for each level.
 
-    `gains`: name of the gain set.  `wall`: a key of PUSHES.  `levels`: forces before the squash, in N/kg at a marker or rad/s^2 at a motor.
+    `gains`: name of the gain set.  `wall`: a key of PUSHES.  `seed`: of the plant.  `levels`: forces before the squash, in N/kg at a marker
+    or rad/s^2 at a motor.
 
     Each record has the worst values during the level: "solid_mm" and "beside_mm", depths of contacts of solids, of the pairs of shapes that
     the simulator tests too, and of all others; "pair", the deepest of the tested pairs; "field_mm", depth of contacts of fields, volumes
@@ -157,10 +158,14 @@ def _worst(angles: Array) -> float:
 
 
 def draw_hand(gains: str, name: str, seed: int) -> tuple[Record, Array, Array]:
-    """Pull the left hand to the targets of a goal, one after the other.  `name`: a key of GOALS.
+    """Pull the left hand from a start posture to one target after the other.
 
-    Returns the measurements, times (T,) s, and distances from the present target (T,) m.  The measurements are "oscillation_mm" and
-    "from_target_mm", oscillation and distance from the target at rest, and "dead_s", the longest time without motion before the end.
+    `gains`: name of the gain set, "default" or "published_2014".  `name`: a key of GOALS, which gives the start posture and the targets.
+    `seed`: of the plant.
+
+    Returns the measurements, times (T,) s, and distances (T,) m of the hand from the target of each time.  The measurements are
+    "oscillation_mm" and "from_target_mm", oscillation and distance from the last target at the end; "dead_s", the longest time for which
+    the hand stood still before it was at its end position; and the names "gains" and "target".
     """
     goal, robot = GOALS[name], icub().robot
     plant = OfflinePlant(icub(), seed, Gains.named(gains), dt=PERIOD[gains])

@@ -65,8 +65,8 @@ class Judged(Row):
     deepest solid contact while the robot wanders and while the hands press into the table with commands 1 and 3 ticks old; `field_mm`:
     deepest field contact while pressing; `pushed_mm`: deepest solid contact while a client pushes.  `chatter_mm`, `late_mm`, `later_mm`:
     chatter of the palms with commands 1, 3 and 4 ticks old.  `clause_deg`, `forced_deg`: largest violation of a constraint without and with
-    a pushing client, negative inside.  `stop_deg_s`: fastest impact at a hard stop.  `longest_ms`: longest control period at which the law
-    is stable.
+    a pushing client, negative inside.  `stop_deg_s`: fastest impact at a hard stop.  `longest_ms`: longest control period at which the
+    control law is stable.
     """
 
     settling_s: float  # median of steps of motors and postures

@@ -153,7 +153,7 @@ def reproduce(robot: Robot, fit: Fit, actions: int, seed: int) -> dict[str, Any]
 
     Returns the differences of the motors' positions [deg] ("rms_deg", "largest_deg", and at the ends of actions "end_deg" and
     "largest_end_deg") for the offline plant with "identified", "published" and "ideal" motors, and for "pybullet_with_other_noise".  `fit`:
-    the fitted motors.  `actions`: their number.
+    the fitted motors.  `actions`: their number.  `seed`: of actions and noise.
     """
     model = Model(robot, World())
     targets = free_targets(model, actions, np.random.default_rng([seed, 3]))

@@ -193,7 +193,10 @@ def _delay_deviation(squares: Array, best: Array) -> Array:
 
 
 def known_motors(count: int, seed: int) -> MotorParameters:
-    """Draw random parameters of `count` motors.  Every third motor has no friction, and every fifth has no play."""
+    """Draw random parameters of `count` motors.  Every third motor has no friction, and every fifth has no play.
+
+    `seed`: of the draw.
+    """
     rng = np.random.default_rng([seed, 1])
     lag, delay = rng.uniform(0.01, 0.1, count), 0.005 * rng.integers(0, 9, count)
     backlash, friction = np.deg2rad(rng.uniform(0.0, 0.8, count)), np.deg2rad(rng.uniform(0.0, 2.0, count))
@@ -207,7 +210,7 @@ def synthetic(
 ) -> list[Responses]:
     """Return simulated responses, with encoder noise, of motors with these parameters, for each motor of the robot.
 
-    `signals`: two signals (ticks,) rad/s.  `shape`: numbers of postures and of repetitions.
+    `seed`: of the noise.  `signals`: two signals (ticks,) rad/s.  `shape`: numbers of postures and of repetitions.
     """
     rng = np.random.default_rng([seed, 2])
     sigma = NOISE * np.sqrt(NOISE_PERIOD / DT)
@@ -222,7 +225,7 @@ def check_method(robot: Robot, postures: int, repetitions: int, seed: int) -> di
     """Fit simulated motors with known values, and compare the fit with these values.
 
     Returns the largest error of each parameter, absolute and in standard deviations, and "passed", whether all errors are less than 5
-    standard deviations.
+    standard deviations.  `postures`, `repetitions`: numbers of simulated postures and of repetitions at each.  `seed`: of the draw.
     """
     signals = fitted_signal(), held_out_signal(np.random.default_rng(seed))
     known = known_motors(len(robot.motors), seed)

@@ -73,7 +73,10 @@ def _hold(speed: float, duration: float) -> Array:
 
 
 def make_body(robot: Robot, seed: int) -> Backend:
-    """Return the PyBullet robot in an empty world; raises BackendUnavailable without PyBullet."""
+    """Return the PyBullet robot in an empty world; raises BackendUnavailable without PyBullet.
+
+    `seed`: of the encoder noise.
+    """
     try:
         from services.robot_sim.bullet import BulletBackend  # needs PyBullet, which is not available for every Python
     except ModuleNotFoundError as error:
@@ -146,7 +149,7 @@ def record(body: Backend, robot: Robot, motor: int, at: Array, signals: tuple[Ar
 
 
 def save(path: Path, responses: Responses, at: Array, signals: tuple[Array, Array]) -> None:
-    """Write responses, postures and signals to a file, in SI units.  An interruption leaves no incomplete file."""
+    """Write responses, postures `at` and signals to a file, in SI units.  An interruption leaves no incomplete file."""
     unfinished = path.with_suffix(".part.npz")
     np.savez_compressed(
         unfinished, fitted=responses.fitted.astype(np.float32), held_out=responses.held_out.astype(np.float32), postures=at,

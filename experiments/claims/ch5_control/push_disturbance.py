@@ -92,7 +92,10 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Push the left hand of the robot once, and return the worst measurements by name, as in `push_hand`."""
+    """Push the left hand of the robot once, and return the worst measurements by name, as in `push_hand`.
+
+    `settings`: "law", one of LAWS; "direction"; "force" [N].  `seed`: of the plant.
+    """
     return push_hand(settings["law"], settings["direction"], settings["force"], seed)
 
 
@@ -135,7 +138,7 @@ def push_hand(law: str, direction: str, force: float, seed: int) -> dict[str, An
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the results as a dict from the law to a dict from the direction to numbers by name, and "passed".
+    """Return the results as a dict from the control law to a dict from the direction to numbers by name, and "passed".
 
     "solids_touch_from_N", "constraint_violated_from_N" and "motor_into_its_stop_from_N": smallest force [N] with this event; None if it did
     not occur.  "deepest_solid_mm": depth of the deepest contact.  "back_within_mm": the last distance of the hand from its start, the

@@ -56,7 +56,7 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
     """Return the conditions of the sweep: every gain set, control period and step.
 
     A step is one of a single motor or of a whole posture; motors that the gain set never moves have none.  Raises UnknownName for an
-    unknown motor, and InvalidValue for a period at which the law is not stable.
+    unknown motor, and InvalidValue for a period at which the control law is not stable.
     """
     known, periods, chosen, count = icub().robot.motors, arguments.periods, arguments.motors, arguments.postures
     if arguments.quick:
@@ -81,7 +81,8 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Run one step and measure it.  Returns the settings and the measurements as one dict.
 
     Main keys: "settling", time [s]; "overshoot", as a share of the step; "is_settled"; "error_deg", distance of the end position from the
-    attractor.
+    attractor.  `settings`: "gains", their name; "period_ms", control period; "step", name of a motor, or "posture N" for a step of many
+    motors.  `seed`: of the plant.
     """
     step, gains = settings["step"], Gains.named(settings["gains"])
     if step.startswith(POSTURE):

@@ -68,7 +68,9 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
     Returns `errors` (checks + 1, 2), the mean L1 errors before the first transition after the change and then after every 20 transitions:
     column 0 of the changed actions (0 in a world that does not change), column 1 of all others.  `tries` is the mean number of tries of a
-    changed action since the change, divided by that of all actions that can be tried (1 in a world that does not change).
+    changed action since the change, divided by that of all actions that can be tried (1 in a world that does not change).  `settings`:
+    "agent", a key of AGENTS; "changed", whether the world changes; "before" and "after", numbers of transitions.  `seed`: of agent and
+    world.
     """
     space, rng = arm_space(), np.random.default_rng([seed, 726])
     middle = int(rng.integers(len(space)))

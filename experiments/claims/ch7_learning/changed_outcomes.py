@@ -61,7 +61,7 @@ def plant_of(change: str, is_after: bool, seed: int) -> OfflinePlant:
     """Return an offline plant of the left arm at home, before or after a change of its world.
 
     `change` "object": after the change, a ball of 6 cm radius is in the space of the arm.  "friction": the elbow has friction, after the
-    change twice as much, and actions time out after 8 s.
+    change twice as much, and actions time out after 8 s.  `seed`: of the plant.
     """
     if change == "object":
         return arm_plant(seed, world=_ball() if is_after else None)
@@ -125,7 +125,9 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
     Returns `seen` (T, 3), the transitions: state, action, state reached.  `series` (checks, 4): the mean L1 error of the changed and of the
     unchanged actions, then the mean value [nats] of both.  `at_change`: the error of the changed actions before the first transition after
-    the change.  `changed`, `same`: the masks (S, A) of `compare`.  Raises InvalidValue if no action is changed.
+    the change.  `changed`, `same`: the masks (S, A) of `compare`.  Raises InvalidValue if no action is changed.  `settings`: "change", a
+    key of CHANGES; "explorer"; "forgetting", the factor with which the agent forgets; "transitions", their number before the change, and
+    after it.  `seed`: of agent and plant.
     """
     change, known = settings["change"], truths(settings["change"])
     changed, same = compare(*known)

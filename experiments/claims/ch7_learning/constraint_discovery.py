@@ -77,7 +77,8 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Explore until every action was tried 5 times (or as often as the setting `least` says), at most 20 000 transitions.
 
     Returns `seen` (T, 3), the transitions: state, action, state reached; and for each of the (81, 8) actions its `tries` and its `values`
-    [nats] at the end.
+    [nats] at the end.  `settings`: "law", a key of LAWS; "discount" and "initial", as for `CuriousAgent`; "least".  `seed`: of agent and
+    plant.
     """
     space, plant = arm_space(), arm_plant(seed, gains=LAWS[settings["law"]](Gains.published_2014()))
     begin_anywhere(space, plant, seed)

@@ -80,7 +80,8 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
     Returns for each of the T actions whether it moved the cup, `moved` (T,), and whether the cup fell, `fell` (T,); `path`, the length of
     the cup's path [m]; and for each try to push the cup to a cell whether it got there, by plans in `reached` (tries,), and in runs of the
-    random agent by random actions in `by_chance` (tries,).
+    random agent by random actions in `by_chance` (tries,).  `settings`: "arrangement", a key of ARRANGEMENTS; "agent", a key of AGENTS;
+    "transitions", their number; "tries", their number.  `seed`: of agent and plant.
     """
     arrangement = ARRANGEMENTS[settings["arrangement"]]
     explorer, perceived = AGENTS[settings["agent"]]
@@ -133,7 +134,7 @@ ROW: dict[str, Callable[[Mapping[str, Any]], float]] = {
 
 
 def pushed(runs: Runs) -> dict[str, list[float]]:
-    """Return the share of tries of each run in which the cup got to the chosen cell, by what chose the actions.
+    """Return a dict from what chose the actions to the share of tries of each run in which the cup got to the chosen cell.
 
     The keys are "AGENT, then plans", for plans with what the agent has learned, and "random actions".
     """

@@ -105,7 +105,7 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     Returns `state_actions`, the number of actions; `floor`, the length of the shortest walk over all of them; `new_actions` (E,), the
     numbers (from 1) of the transitions that tried an action for the first time; `new_states`, the numbers of the transitions that reached a
     state for the first time, and 0 for the state at the start; the number of `transitions`; and `failed`, the share that did not end in
-    their goal.
+    their goal.  `settings`: "explorer"; "graph", a key of GRAPHS; "world", one of WORLDS; "discount".  `seed`: of agent, graph and plant.
     """
     space = arm_space(neighbours=GRAPHS[settings["graph"]], tie_seed=seed)
     plant = arm_plant(seed, free=settings["world"] == "free")
@@ -166,7 +166,7 @@ def findings(found: Cells) -> dict[str, Any]:
 
 
 def by_agent(found: Cells) -> dict[tuple[str, str, str], Runs]:
-    """Group the values of the finished runs by (graph, world, agent), each group sorted by seed.
+    """Return a dict from (graph, world, agent) to the values of the finished runs, sorted by seed.
 
     The agent is the name of its explorer, followed by the discount if this is not 0.9: "curious", "curious 0.5".
     """
@@ -202,7 +202,7 @@ def unfinished(runs: Runs) -> int:
 
 
 def first_repeat(run: Mapping[str, Any]) -> int:
-    """Return the number, counted from 1, of the first transition with an action that had already been tried."""
+    """Return the number, counted from 1, of the first transition of a run with an action that had already been tried."""
     later = np.flatnonzero(run["gaps"] != 1)
     return int(later[0]) + 1 if len(later) else len(run["gaps"]) + 1
 
@@ -213,7 +213,7 @@ def states_seen(run: Mapping[str, Any], transitions: int) -> int:
 
 
 def row(runs: Runs) -> dict[str, Any]:
-    """Return the row of results for runs with the same settings, by label: numbers of runs, transitions, repeats, states, failures."""
+    """Return a dict from a label to a number for runs with the same settings: of runs, transitions, repeats, states and failures."""
     low, high = interval(covered(runs))
     return {
         "seeds": len(runs),

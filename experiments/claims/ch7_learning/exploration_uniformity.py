@@ -59,7 +59,10 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Explore one graph with one explorer; returns the transitions `seen` (T, 3): state, action, state reached."""
+    """Explore one graph with one explorer; returns the transitions `seen` (T, 3): state, action, state reached.
+
+    `settings`: "graph", one of GRAPHS; "explorer"; "transitions", their number.  `seed`: of agent and plant.
+    """
     space, plant = space_of(settings["graph"]), arm_plant(seed)
     begin_anywhere(space, plant, seed)
     agent = CuriousAgent(space, plant, settings["explorer"], seed)

@@ -49,7 +49,10 @@ def space_of(part: str) -> Lattice:
 
 
 def plant_of(part: str, seed: int) -> OfflinePlant:
-    """Return an offline plant without objects in which only the motors of the part, "left_arm" or "torso", move."""
+    """Return an offline plant without objects in which only the motors of the part, "left_arm" or "torso", move.
+
+    `seed`: of the plant.
+    """
     if part == "torso":
         return OfflinePlant(Model(robot()), seed, Gains.published_2014(), dt=DT, active=TORSO)
     return arm_plant(seed)
@@ -72,7 +75,8 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Let a curious agent explore with one part and one divergence as reward.
 
     Returns the transitions `seen` (T, 3): state, action, state reached; their `rewards` (T,) [nats]; and `first_reward`, the largest
-    expected reward of an action before any try.
+    expected reward of an action before any try.  `settings`: "part"; "divergence"; "transitions", their number.  `seed`: of agent and
+    plant.
     """
     part, divergence = settings["part"], settings["divergence"]
     space, plant = space_of(part), plant_of(part, seed)
@@ -144,7 +148,10 @@ def tries_to_prefer(part: str, divergence: str, kind: str) -> float:
 
 
 def groups(found: Cells) -> Groups:
-    """Group the counts (tries, failures and visits) of the finished runs by (part, divergence); each group is sorted by seed."""
+    """Return the counts (tries, failures and visits) of the finished runs as a dict from (part, divergence) to a list sorted by seed.
+
+    Parts: "left_arm", "torso".  Divergences, which define the reward: "kail" (thesis 6.4.2), or "kl", plain KL with a uniform prior.
+    """
     return explored(found, space_of, "part", "divergence")
 
 

@@ -166,7 +166,7 @@ def runs_in(folder: Path) -> Runs:
 
 
 def distances(runs: Runs) -> dict[str, list[Distance]]:
-    """Return how far the outcomes of each run are from those of the offline runs, by robot, in the order of the runs.
+    """Return a dict from the robot to how far the outcomes of each of its runs are from those of the offline runs.
 
     A distance has the mean total variation of the outcomes of an action, and the share of actions with the same most frequent outcome.  An
     offline run is compared with all other offline runs together.  A live run is compared with all offline runs except one, and the distance

@@ -74,12 +74,18 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Train an agent with one kind of table, then send the arm to the goals of the queries by plans; roadmaps are tested without training.
+    """Train an agent with or without a table in its workspace, and let it plan for queries; or let roadmaps plan for the same queries.
 
-    Returns `tests`, nested dicts to numbers: by planner ("plans" of the MDP, or the roadmaps "planned once", "repairs", "remembers"), by
-    position of the table ("down", "moving", "up"), and by measure as in `tested`.  After training without the table or with one that moves,
-    also the transitions `seen` (T, 3), the counts of `fates`, and the model's `outcomes` and `probabilities` (S, A, B).  If the table
-    enters, returns instead `rows`, the measures with the raised table, and `after`, the numbers of transitions since it entered.
+    `settings`: "training": "still" (without the table), "moving" (the table moves up and down), "enters" (the table is raised after 2000
+    transitions, and the agent continues to learn), or "roadmap" (no training); "queries", their number, each a start state and a goal
+    state; "share" of the usual number of transitions; for "enters" also "forgetting", the factor with which the agent forgets.
+
+    `seed`: of agent, plant and queries.  The keys of the result depend on "training".  For "roadmap": "tests", a dict from the planner
+    ("planned once", "repairs", "remembers") to a dict from the position of the table in the queries ("down", "moving", "up") to a dict of
+    measures, as in `tested`.  For "still" and "moving": "tests", with the planner "plans"; "seen", the transitions (T, 3); "fates", the
+    counts that `fates` returns; and the learned model, "outcomes" and "probabilities" (S, A, B), with B possible outcomes of a
+    state-action.  For "enters": "after", numbers of transitions since the table was raised; and "rows", a dict of measures with the raised
+    table for each of them.
     """
     condition, share, space = settings["training"], settings["share"], arm_space(RANK3, ARM_NEIGHBOURS)
     plant = TablePlant(seed, moves=condition == "moving")
@@ -323,7 +329,8 @@ def draw_arrows(axes: Any, space: Lattice, outcomes: Ints, probabilities: Array)
 
     `outcomes`, `probabilities`: (S, A, B).  Pitch and elbow vary within a block, roll and yaw from block to block.  Grey lines are all
     state-actions.  A state-action with a probability of at least 0.3 of ending neither in its goal nor where it starts has a colour of its
-    own, and an arrow to each other state with a probability of 0.08 or more; the width of an arrow is the probability.
+    own, and an arrow to each other state with a probability of 0.08 or more; the width of an arrow is the probability.  `axes`: of
+    Matplotlib.
     """
     from matplotlib import colormaps
     from matplotlib.collections import LineCollection

@@ -81,7 +81,10 @@ def plant_of(world: str) -> Callable[[int], Plant]:
 
 
 def half_space_plant(seed: int) -> TabularPlant:
-    """Return a tabular plant of 81 states in which a half-space separates the states 24, 51 and 78 from the others."""
+    """Return a tabular plant of 81 states in which a half-space separates the states 24, 51 and 78 from the others.
+
+    `seed`: of the random outcomes.
+    """
     space = space_of("half-space")
     return TabularPlant(space, *half_space(space), seed)
 
@@ -108,7 +111,8 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Explore one world with an explorer or, to measure the true outcomes, by a walk.
 
-    Returns the transitions `seen` (T, 3): state, action, state reached.
+    Returns the transitions `seen` (T, 3): state, action, state reached.  `settings`: "world", a key of WORLDS; "explorer", its name, or
+    "walk".  `seed`: of agent and plant, or of the walk.
     """
     name, explorer = settings["world"], settings["explorer"]
     space, world, plant = space_of(name), WORLDS[name], plant_of(name)
@@ -120,7 +124,7 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def truths(found: Cells) -> dict[str, OutcomeModel]:
-    """Return the true outcomes by world: a table for the half-space, frequencies in the finished walks for the arm.
+    """Return a dict from the world to its true outcomes: a table for the half-space, frequencies in the finished walks for the arm.
 
     A world of the arm without a finished walk is absent.
     """
@@ -132,7 +136,7 @@ def truths(found: Cells) -> dict[str, OutcomeModel]:
 
 
 def errors(found: Cells, known: Mapping[str, OutcomeModel]) -> dict[tuple[str, str], Array]:
-    """Return the L1 errors of the models learned in each run, (seeds, times, columns), by world and explorer.
+    """Return a dict from (world, explorer) to the L1 errors of the models learned in each run, (seeds, times, columns).
 
     `known`: the true outcomes by world; worlds that are absent are left out.  `times` returns the times, numbers of transitions.  Columns 0
     and 1: errors with imagined outcomes, pseudo-counts from before the first try, over all and over stochastic actions; columns 2 and 3:

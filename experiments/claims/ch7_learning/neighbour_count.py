@@ -57,7 +57,8 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
     Returns for each task whether it was solved, `reached` (budgets, tasks), by how many `actions` (budgets, tasks), and the `fewest`
     actions that the graph allows (tasks,); `covered`, the transitions until every action was tried (None: one was not); and
-    `state_actions`, the number of actions of the graph.
+    `state_actions`, the number of actions of the graph.  `settings`: "graph", number of neighbours or "equidistant"; "tasks", their number;
+    "budgets".  `seed`: of agent, graph, tasks and plant.
     """
     space, plant = arm_space(neighbours=settings["graph"], tie_seed=seed), arm_plant(seed)
     begin_anywhere(space, plant, seed)
@@ -84,13 +85,16 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def drawn_tasks(space: Space, count: int, seed: int) -> list[tuple[int, int]]:
-    """Draw `count` random tasks: pairs of a start state and a goal state, which differ."""
+    """Draw `count` random tasks: pairs of a start state and a goal state, which differ.
+
+    `seed`: of the draw.
+    """
     rng = np.random.default_rng(seed)
     return [(int(a), int(b)) for a, b in (rng.choice(len(space), 2, replace=False) for _ in range(count))]
 
 
 def fewest_actions(space: Space, start: int, goal: int) -> int:
-    """Return the smallest number of actions from one state to another if all actions succeed; 0 if there is no path."""
+    """Return the smallest number of actions from the state `start` to the state `goal` if all actions succeed; 0 if there is no path."""
     reached, count = {start}, 0
     while goal not in reached:
         further = {int(to) for state in reached for to in space.actions(state)} | reached

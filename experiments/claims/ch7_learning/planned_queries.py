@@ -47,7 +47,10 @@ class TablePlant(WrappedPlant[OfflinePlant]):
         self.world.move("table", position=_middle(height))
 
     def act(self, part: str, target: Array) -> Outcome:
-        """Perform an action as `mobee.plant.Plant.act` does; a table that moves is moved before every tenth action."""
+        """Perform an action as `mobee.plant.Plant.act` does; a table that moves is moved before every tenth action.
+
+        `part`, `target`: as in that method.
+        """
         if self._moves and self._actions % PERIOD == 0:
             self.set_top(self._rng.choice((DOWN, UP)))
         self._actions += 1
@@ -80,7 +83,10 @@ class FrozenModel:
         return sample
 
     def observe(self, start: Array, end: Array) -> None:
-        """Do nothing, because the model learns nothing from a motion; as in `experiments.kit.learning.arm_planners.Rival.observe`."""
+        """Do nothing, because the model learns nothing from a motion.
+
+        `start`, `end`: as in `experiments.kit.learning.arm_planners.Rival.observe`.
+        """
 
 
 def roadmaps(plant: TablePlant, space: Lattice) -> dict[str, Rival]:
@@ -111,7 +117,10 @@ class Queries:
 
     @classmethod
     def of_seed(cls, plant: TablePlant, space: Lattice, count: int, seed: int) -> Queries:
-        """Draw `count` queries on a lattice; afterwards the table is at its lower height."""
+        """Draw `count` queries on a lattice; afterwards the table is at its lower height.
+
+        `seed`: of the draw.
+        """
         blocked = touched_states(plant, space, UP) & ~touched_states(plant, space, DOWN)
         return cls(space, drawn_pairs(plant, space, count, seed), blocked, seed)
 
@@ -128,10 +137,11 @@ class Queries:
         return followed.numbers() | {"promised": promised, "kept": kept, "through": through(followed.paths, self.blocked)}
 
     def in_all_worlds(self, rival: Rival) -> dict[str, dict[str, float]]:
-        """Let a planner answer all queries with each position of the table, and return the measures as nested dicts.
+        """Let the planner `rival` lead the arm through all queries, once for each position of the table; return the measures.
 
-        The keys are the position, "down", "moving" (drawn for every query) or "up", and then "success", "actions", "touched" and "met" as
-        in `Followed`.
+        They are a dict from the position, "down", "up" or "moving" (drawn for every query), to a dict from the name of a measure to its
+        value: "success", share of queries that reached their goal state; "actions", number per query; "touched", share of actions that
+        ended in contact with the table; "met", share of queries with such an action.  `Followed` defines them.
         """
         return {test: self._followed(rival, test).numbers() for test in TESTS}
 
@@ -153,7 +163,7 @@ def touched_states(plant: TablePlant, space: Lattice, top: float) -> NDArray[np.
 def drawn_pairs(plant: TablePlant, space: Lattice, count: int, seed: int) -> list[tuple[int, int]]:
     """Draw up to `count` pairs of states whose straight path in joint space is blocked by the raised table, and by nothing else.
 
-    In neither of the two states the arm touches the raised table.  Afterwards the table is at its lower height.
+    In neither of the two states the arm touches the raised table.  Afterwards the table is at its lower height.  `seed`: of the draw.
     """
     free = np.flatnonzero(~touched_states(plant, space, UP))
     every = list(permutations(free.tolist(), 2))
@@ -189,7 +199,7 @@ class Followed:
     paths: Paths
 
     def numbers(self) -> dict[str, float]:
-        """Return the fields `success`, `actions`, `touched` and `met` by name."""
+        """Return a dict with the fields `success`, `actions`, `touched` and `met`."""
         return {"success": self.success, "actions": self.actions, "touched": self.touched, "met": self.met}
 
 
@@ -228,7 +238,8 @@ def promises(space: Lattice, beliefs: OutcomeModel, pairs: Sequence[tuple[int, i
     """Return how much of the plans was predicted and fulfilled: two numbers from 0 to 1, means over the queries.
 
     The first is the predicted probability that all actions of a plan end as planned.  The second is the share of queries whose states, in
-    `paths`, were exactly those of the plan.  `beliefs`: transition model of the plans.  A query without a plan counts as 0 in both.
+    `paths`, were exactly those of the plan.  `beliefs`: transition model of the plans.  `pairs`: start and goal state of each query.  A
+    query without a plan counts as 0 in both.
     """
     plans = [_plan(space, beliefs, start, goal) for start, goal in pairs]
     kept = [plan is not None and plan.path == path for plan, path in zip(plans, paths, strict=True)]

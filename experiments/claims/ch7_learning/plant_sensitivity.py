@@ -61,7 +61,10 @@ class Variant:
     robot: Callable[[], Robot] = robot
 
     def plant(self, seed: int) -> OfflinePlant:
-        """Return an offline plant in which the four motors of the left arm move."""
+        """Return an offline plant in which the four motors of the left arm move.
+
+        `seed`: of the plant.
+        """
         gains = self.gain_set()
         gains = replace(gains, **self.gains, settle=replace(gains.settle, **self.settle))
         motors = replace(self.motor_set(), **self.motors)
@@ -135,7 +138,8 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Explore both lattices with the plant of one variant.
 
     Returns the transitions (T, 3) on each lattice, `rank4` and `rank3`; `timeouts`, the share of actions that timed out; and `seconds`, the
-    mean plant time of an action [s].
+    mean plant time of an action [s].  `settings`: "variant", a key of VARIANTS; "share" of the usual number of actions.  `seed`: of agent
+    and plant.
     """
     values: dict[str, Any] = {}
     settled, durations = [], []
@@ -226,7 +230,7 @@ COLUMNS = (  # labels of the fields of a Row
 
 
 def rows_of(found: Cells) -> dict[str, Row]:
-    """Return the row of each variant of the plant that has finished runs, by its name."""
+    """Return a dict from each variant of the plant that has finished runs to its row of results."""
     return {variant: _row(runs) for variant, runs in grouped(found, "variant", (*VARIANTS,)).items()}
 
 

@@ -88,7 +88,9 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
     Returns for each part `seen_PART` (T, 3), the transitions: state, action, state reached; `settled_PART` (T,), False after a timeout;
     `durations_PART` (T,) [s]; and `ends_PART` (T,) [s], the plant time at the end.  For each arm also `touch_ARM` (T,), whether an action
-    ended within 2 cm of the table or ghost, and `forward_ARM` (T,), whether the torso was bent forward then.
+    ended within 2 cm of the table or ghost, and `forward_ARM` (T,), whether the torso was bent forward then.  `settings`: "explorer";
+    "world", "ghost" for the table's ghost; "propagate", "tree" or "part": on which motors contacts act; "transitions", the number for each
+    agent.  `seed`: of agents and plant.
     """
     count = settings["transitions"]
     plant = table_plant(seed, settings["world"] == "ghost", settings["propagate"])

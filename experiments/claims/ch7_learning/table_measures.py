@@ -52,7 +52,7 @@ LEARNERS = {"torso": ("torso",), "arms": ARMS}  # both arms have the same graph
 
 @cache
 def spaces() -> dict[str, Lattice]:
-    """Return the lattice of each part ("torso", "left_arm", "right_arm"); both arms have the same graph."""
+    """Return a dict from the part ("torso", "left_arm", "right_arm") to its lattice; both arms have the same graph."""
     return {"torso": torso_space(), **{arm: arm_space(RANK3, ARM_NEIGHBOURS, joints=joints) for arm, joints in JOINTS.items()}}
 
 
@@ -151,7 +151,7 @@ class Run:
 
     @cached_property
     def ends(self) -> dict[str, Ints]:
-        """How often each action ended in each state, (S, A, S), by part."""
+        """A dict from the part to how often each of its actions ended in each state, (S, A, S)."""
         found = {part: np.zeros((*spaces()[part].goals.shape, len(spaces()[part])), dtype=np.int32) for part in PARTS}
         for part, counts in found.items():
             counts.ravel()[self.result.values[f"ends_at_{part}"]] = self.result.values[f"ends_{part}"]
@@ -159,17 +159,17 @@ class Run:
 
     @cached_property
     def tries(self) -> dict[str, Ints]:
-        """The tries of each action, (S, A), by part."""
+        """A dict from the part to the number of tries of each of its actions, (S, A)."""
         return {part: ends.sum(axis=-1) for part, ends in self.ends.items()}
 
     @cached_property
     def late_tries(self) -> dict[str, Ints]:
-        """The tries of each action in the second half of the run, (S, A), by part."""
+        """A dict from the part to the number of tries of each of its actions in the second half of the run, (S, A)."""
         return {part: self.result.values[f"late_tries_{part}"].astype(np.intp) for part in PARTS}
 
     @cached_property
     def outcomes(self) -> dict[str, Ints]:
-        """The number of different states in which each action ended, (S, A), by part."""
+        """A dict from the part to the number of different states in which each of its actions ended, (S, A)."""
         return {part: (ends > 0).sum(axis=-1) for part, ends in self.ends.items()}
 
     @cached_property
@@ -237,7 +237,7 @@ class Run:
 
     @property
     def timeouts(self) -> dict[str, float]:
-        """The share of actions that timed out, by part."""
+        """A dict from the part to the share of its actions that timed out."""
         return {part: self.number(f"timeouts_{part}") for part in PARTS}
 
     @property
@@ -250,7 +250,7 @@ Runs = Mapping[tuple[str, str], list[Run]]  # by explorer and world
 
 
 def runs_of(found: Cells) -> dict[str, Runs]:
-    """Group the finished runs by propagation of contact forces ("tree" or "part"), then by (explorer, world).
+    """Return a dict from the propagation of contact forces ("tree" or "part") to a dict from (explorer, world) to the finished runs.
 
     Each group is sorted by seed; groups without a finished run are absent.
     """
@@ -300,7 +300,7 @@ def agreement(pair: Array) -> float:
 
 
 def autocorrelation(rate: Array, most: int) -> Array:
-    """Return the autocorrelation of a series at the lags 0 to `most`, (most + 1,), after its linear trend is removed."""
+    """Return the autocorrelation of the series `rate` at the lags 0 to `most`, (most + 1,), after its linear trend is removed."""
     steps = np.arange(len(rate))
     residuals = rate - np.polyval(np.polyfit(steps, rate, 1), steps)
     products = [float((residuals[lag:] * residuals[: len(residuals) - lag]).sum()) for lag in range(most + 1)]

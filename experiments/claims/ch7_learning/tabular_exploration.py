@@ -106,7 +106,8 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     "coverage" returns `pairs`, the number of actions in reachable states; `once` and `often`, transitions until each was tried once and
     five times, at most `most`; `finished`, whether each of both was achieved; and `error`, the L1 error of the beliefs.  "return" returns
     `best`, the mean reward per action under the best policy; `share`, the mean reward divided by it; and `earned`, the sum of rewards at
-    100 times.
+    100 times.  `settings`: "task"; "world", a key of WORLDS; "explorer"; and for "return" its parameter "number".  `seed`: of agent and
+    world.
     """
     world = WORLDS[settings["world"]](seed)
     plant = RewardedPlant(world, seed)
@@ -212,7 +213,7 @@ def _dense(model: Any) -> Array:
 
 
 def groups(found: Cells, task: str) -> dict[tuple[str, str, float], Runs]:
-    """Group the values of the finished runs of a task, "coverage" or "return", by (world, explorer, value of the explorer's parameter)."""
+    """Return a dict from (world, explorer, value of its parameter) to the values of the finished runs of a task, "coverage" or "return"."""
     every = grouped_by(found, "task", "world", "explorer", "number")
     return {key[1:]: runs for key, runs in every.items() if key[0] == task}
 

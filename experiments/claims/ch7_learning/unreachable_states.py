@@ -65,7 +65,8 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
     Returns `seen` (T, 3), the transitions: state, action, state reached; `values` (256, 8) [nats] at the end; `pairs`, the names of the
     pairs of links that touched; and for each transition `touching` (T,), the index in `pairs` of the pair that touched (-1: none), and
-    `depths` (T,), the depth [m] of the deepest self-contact (0: none).
+    `depths` (T,), the depth [m] of the deepest self-contact (0: none).  `settings`: "lattice", a key of LEVELS; "transitions", their
+    number.  `seed`: of agent and plant.
     """
     space, plant = arm_space(LEVELS[settings["lattice"]]), arm_plant(seed)
     begin_anywhere(space, plant, seed)
@@ -110,7 +111,7 @@ class SelfContactPlant(WrappedPlant[OfflinePlant]):
     def act(self, part: str, target: Array) -> Outcome:
         """Perform an action as `mobee.plant.Plant.act` does, and record its deepest self-contact in `contacts`.
 
-        The outcome does not name touched objects.
+        The outcome does not name touched objects.  `part`, `target`: as in `Plant.act`.
         """
         plant, settle = self.inner, self.inner.controller.gains.settle
         where, start = self.robot.part(part).slice, plant.time - plant.dt

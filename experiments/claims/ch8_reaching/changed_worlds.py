@@ -89,7 +89,7 @@ class FixedRate:
     def add(self, learned: float, unknown: float) -> int | None:
         """Count an outcome; returns 100 at every hundredth outcome, else None.
 
-        The probabilities are not used.  As in `mobee.learning.reaching.changes.Detector.add`.
+        `learned`, `unknown`: probabilities, which are not used.  As in `mobee.learning.reaching.changes.Detector.add`.
         """
         self._outcomes += 1
         return None if self._outcomes % 100 else 100
@@ -176,7 +176,10 @@ class SeenPlant(WrappedPlant[SelfCalibratingPlant]):
         super().present(target)
 
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
-        """Reach as `mobee.reach.ReachPlant.reach` does; the outcome has the true position of the marker and the true error that remains."""
+        """Reach as `mobee.reach.ReachPlant.reach` does; the outcome has the true position of the marker and the true error that remains.
+
+        `part`, `marker`, `stay`: as in that method.
+        """
         found, where = super().reach(part, marker, stay), self._judge.reached
         return replace(found, marker=where, missing=self._target.missing(where))
 
@@ -203,7 +206,7 @@ def plant_of(change: str, ball: int, seed: int) -> JudgedPlant:
     """Return the right arm at the table, after a change of the world.
 
     `change`: "nothing" (also the world before every change), "ball", "table" (raised) or "turn" (miscalibrated joints).  `ball`: number of
-    the ball that appears, 0 to 19; used by the change "ball" alone.
+    the ball that appears, 0 to 19; used by the change "ball" alone.  `seed`: of the plant.
     """
     plant = _offline_plant(_world_of(change, ball), seed)
     turns = np.zeros(len(robot().motors))
@@ -215,7 +218,7 @@ def plant_of(change: str, ball: int, seed: int) -> JudgedPlant:
 def seen_plant(change: str, ball: int, seed: int) -> OfflinePlant:
     """Return a simulated right arm in the world as a learner sees it, with random errors of the object that has appeared or moved.
 
-    `change`: "ball" or "table".  `ball`: as in `plant_of`.
+    `change`: "ball" or "table".  `ball`: as in `plant_of`.  `seed`: of errors and plant.
     """
     rng = np.random.default_rng(seed)
     error, error_of_radius = rng.normal(0.0, SEEN, 3), float(rng.normal(0.0, SEEN_RADIUS))
@@ -244,7 +247,10 @@ def targets() -> list[ReachTarget]:
 
 @cache
 def model_of(seed: int) -> TransitionModel:
-    """Return the transition model of a curious agent that has learned at the table for 3000 transitions."""
+    """Return the transition model of a curious agent that has learned at the table for 3000 transitions.
+
+    `seed`: of agent and plant.
+    """
     plant = plant_of("nothing", -1, seed + 300).inner
     begin_anywhere(reach_space(), plant, seed)
     agent = CuriousAgent(reach_space(), plant, seed=seed)
@@ -255,10 +261,12 @@ def model_of(seed: int) -> TransitionModel:
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Let every learner learn, change the world, and let the learners learn again; the oracle of the new world is measured, too.
 
-    Returns for the D learners, after each of L numbers of problem-tries since the change, the means over the evaluations: `score` (D, L),
-    sum of the rewards; `failures` (D, L), failed transitions; `without` (D, L), targets without a reach.  `false` (D,): number of changes
-    detected before the world changed.  `detected` (D,): problem-tries after the change until one was detected, 0 if it was seen, inf if
-    neither.  `oracle`: score of the oracle.
+    Returns for the D learners, after each of L numbers of problem-tries (attempts to reach one target) since the change, the means over the
+    evaluations: `score` (D, L), sum of the rewards; `failures` (D, L), failed transitions; `without` (D, L), targets without a reach.
+    `false` (D,): number of changes detected before the world changed.  `detected` (D,): problem-tries after the change until one was
+    detected, 0 if it was seen, inf if neither.  `oracle`: score of the oracle.  `settings`: "change" and "ball", as in `plant_of`; "tries",
+    the number before the change; "checkpoints", the L numbers; "practice", number of tries in a simulation of the changed world.  `seed`:
+    of learners and plants.
     """
     found = [_learned(*learner, settings, seed) for learner in LEARNERS.values()]
     names = ("score", "failures", "without", "false", "detected")
@@ -390,12 +398,18 @@ def runs_of(found: Cells) -> Runs:
 
 
 def relative(runs: list[dict[str, Any]]) -> Array:
-    """Return the scores of N runs after L numbers of problem-tries, divided by the score of the new world's oracle, (N, L)."""
+    """Return the scores of N runs after L numbers of problem-tries, divided by the score of the new world's oracle, (N, L).
+
+    A problem-try is one attempt to reach one target.
+    """
     return np.array([run["score"] / run["oracle"] for run in runs])
 
 
 def failures(runs: list[dict[str, Any]]) -> Array:
-    """Return the mean number of failed transitions in an evaluation, of N runs after L numbers of problem-tries, (N, L)."""
+    """Return the mean number of failed transitions in an evaluation, of N runs after L numbers of problem-tries, (N, L).
+
+    A problem-try is one attempt to reach one target.
+    """
     return np.array([run["failures"] for run in runs])
 
 
@@ -469,7 +483,7 @@ CLAIMS = (
 def plot(found: Cells) -> Any:
     """Draw scores and failed transitions over the problem-tries since the change, in a column of panels for each change.
 
-    Returns a matplotlib figure.
+    Returns a matplotlib figure.  A problem-try is one attempt to reach one target.
     """
     runs = runs_of(found)
     drawing = new_figure(16.0, 7.0)

@@ -84,7 +84,8 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Train a learner, and let planner, reach and both together attempt the same cases of each scene.
 
     Returns arrays (cases,) with keys "scene|method|measure".  The measures are "missing", the distance of the palm from the target's
-    surface [m]; "seconds", plant time; and "reward" (thesis eq. 8.4).
+    surface [m]; "seconds", plant time; and "reward" (thesis eq. 8.4).  `settings`: "law", one of LAWS; "transitions" and "tries", numbers
+    of the training; "cases", their number.  `seed`: of learner and cases.
     """
     law = settings["law"]
     agent = trained(seed, settings["transitions"], settings["tries"], law)

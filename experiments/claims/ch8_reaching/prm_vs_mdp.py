@@ -99,7 +99,8 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
     Returns `hard` (Q,), whether a straight motion had failed in the query; and arrays with keys "planner|measure".  The measures are
     "success", "seconds" (plant time), "actions" and "repairs", each (Q,), and "cost", hours of plant time or thousands of poses checked
-    before the first query.
+    before the first query.  `settings`: "queries", their number; for the MDP also "learned", the number of transitions; for roadmaps
+    "belief", the kind of errors in their model, as in `believed`.  `seed`: of scene and planners.
     """
     scene, lattice = make_scene(seed, settings["queries"]), space()
     values: dict[str, Any] = {"hard": scene.is_hard}
@@ -175,7 +176,7 @@ def make_scene(seed: int, queries: int) -> Scene:
     """Draw the balls and the errors of a scene, and its queries.
 
     In half of the queries, or fewer if fewer are found, a straight motion does not reach the goal.  Raises InvalidValue if no queries of
-    one of both kinds are found.
+    one of both kinds are found.  `seed`: of the draw.  `queries`: their number.
     """
     rng = np.random.default_rng([seed, 75])
     balls = _balls(rng)

@@ -105,7 +105,8 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     Returns arrays by name.  For the T attempts to reach one target (problem-tries): `problem`, `reach_state`, `reward`, `actions`,
     `duration` [s], each (T,); `failures` (S, A), failures of each transition.  For L evaluations of R repetitions: `rewards_grid` and
     `states_grid` (L, R, 27), and `blocked_grid` (L,), failed transitions.  The names are those of
-    `experiments.kit.reaching.learning.learn`.
+    `experiments.kit.reaching.learning.learn`.  `settings`: "strategy", its name; "law", a key of the dict that `laws` returns; "scale",
+    unit of distances [m]; "checkpoints", numbers of tries before the evaluations.  `seed`: of agent and plant.
     """
     plant = reach_plant(seed, settings["law"])
     beliefs = learned_beliefs(plant, seed)
@@ -321,9 +322,11 @@ CLAIMS = (
 
 
 def plot(found: Cells) -> Any:
-    """Draw the runs with the first unit: scores, robot time and negative rewards; choices of states and tries; the most used states.
+    """Draw the runs with the smallest unit of distances (option --scales), and return the matplotlib figure.
 
-    Choices and tries have a row of panels for each strategy.  Returns a matplotlib figure.
+    Above: scores, robot time and negative rewards of each strategy.  Middle, one row for each strategy: how often the agent reached from
+    each state in the evaluations, and how often it reached for each target from each state in its tries.  Below: pictures of the robot in
+    the four states from which the first strategy, intrinsic motivation, reached most often in the last evaluation.
     """
     runs = next(iter(runs_of(found).values()))
     drawing = new_figure(15.0, 5.0 + 2.6 * len(runs) + 3.9)

@@ -57,14 +57,20 @@ class Episode:
 
 
 def table_plant(seed: int, joints: Sequence[str] = RIGHT) -> OfflinePlant:
-    """Return an offline plant of the iCub at the table, without the ball; only these joints of the right arm move."""
+    """Return an offline plant of the iCub at the table, without the ball; only these joints of the right arm move.
+
+    `seed`: of the plant.
+    """
     world = mobee.load_world("table")
     world.remove("ball")
     return OfflinePlant(Model(mobee.load_robot("icub"), world), seed, active=joints)
 
 
 def learn(file: Path, seed: int = 0, tries: int = TRIES, transitions: int = TRANSITIONS) -> None:
-    """Learn transitions and then to reach for the 27 targets at the table; everything is recorded in `file`."""
+    """Learn transitions and then to reach for the 27 targets at the table; everything is recorded in `file`.
+
+    `seed`: of agent and plant.  `tries`, `transitions`: their numbers.
+    """
     plant = table_plant(seed)
     space = Lattice(plant.robot, RIGHT, RANK3, ARM_NEIGHBOURS)
     with TransitionStore(file, PART) as store:
@@ -77,7 +83,10 @@ def learn(file: Path, seed: int = 0, tries: int = TRIES, transitions: int = TRAN
 
 
 def episodes(agent: ReachAgent, plant: OfflinePlant, count: int, seed: int) -> list[Episode]:
-    """Try `count` times to reach a random target of the agent from a random state; returns the reaches that succeeded."""
+    """Try `count` times to reach a random target of the agent from a random state; returns the reaches that succeeded.
+
+    `seed`: of the draws.
+    """
     rng, found = np.random.default_rng([seed, 8]), []
     for _ in range(count):
         agent.evaluate([], 1)  # puts the robot in a random state
@@ -93,7 +102,7 @@ def episodes(agent: ReachAgent, plant: OfflinePlant, count: int, seed: int) -> l
 
 
 def selected(paths: Sequence[Array]) -> dict[str, int]:
-    """Return the indices of the clearest examples among paths (T, 3) m of the hand, by kind of path.
+    """Return a dict from the kind of path to the index of its clearest example among paths (T, 3) m of the hand.
 
     The kinds are "From above", "Far" and "Around the target".  The clearest example has the steepest descent at its end, the largest
     distance between its ends, or the largest detour.  No path is chosen for two kinds, and none shorter than 15 cm, so that kinds may be
@@ -152,7 +161,8 @@ def _caption(marker: str, motion: Motion, moment: int) -> str:
 def film(file: Path, out: Path, seed: int, poses: int, height: int) -> list[str]:
     """Draw filmstrips of selected reaches of the learner that is recorded in `file`, and return their titles.
 
-    `out`: path of the picture.  `poses`: pictures per reach.  `height`: of each, pixels.  Raises MobeeError if no reach is clear enough.
+    `seed`: of the tries that are filmed.  `out`: path of the picture.  `poses`: pictures per reach.  `height`: of each, pixels.  Raises
+    MobeeError if no reach is clear enough.
     """
     with ReachStore(file, PART, read_only=True) as store:
         joints = store.settings()["space"]["joints"]

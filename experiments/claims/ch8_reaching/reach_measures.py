@@ -25,7 +25,8 @@ class Runs:
     """The N runs of one strategy, sorted by seed.
 
     `values`: results of each run, as `reach_exploration.summary` returns them.  `seconds`: computing time of each, s.  `checkpoints`:
-    numbers of problem-tries after which the agents were evaluated; the argument `checkpoint` of the methods is one of them.
+    numbers of problem-tries (attempts to reach one target) after which the agents were evaluated; the argument `checkpoint` of the methods
+    is one of them.
     """
 
     values: tuple[Mapping[str, Any], ...]
@@ -41,14 +42,18 @@ class Runs:
         return np.array([one["rewards_grid"][at].sum(axis=-1).mean() for one in self.values])
 
     def chosen(self, checkpoint: int) -> Array:
-        """Return how often the evaluations of each run reached from each of the S states, as shares, (N, S) (figs. 8.4 to 8.6)."""
+        """Return how often the evaluations of each run reached from each of the S states, as shares, (N, S) (figs. 8.4 to 8.6).
+
+        `checkpoint`: number of problem-tries (attempts to reach one target) before the evaluation, one of `checkpoints`.
+        """
         at = self.checkpoints.index(checkpoint)
         return np.array([_shares(one["states_grid"][at]) for one in self.values])
 
     def agreement(self, checkpoint: int) -> Array:
         """Return how well the choices of states of each run agree with those of the other runs, (N,), from 0 to 1.
 
-        This is the mean overlap of their shares in `chosen`.
+        This is the mean overlap of their shares in `chosen`.  `checkpoint`: number of problem-tries (attempts to reach one target) before
+        the evaluation, one of `checkpoints`.
         """
         chosen = self.chosen(checkpoint)
         overlaps = np.minimum(chosen[:, None], chosen[None]).sum(axis=-1)
@@ -57,24 +62,33 @@ class Runs:
         return shared
 
     def states_of_half(self, checkpoint: int) -> Array:
-        """Return the smallest number of states from which at least half of a run's reaches started in the evaluations, (N,)."""
+        """Return the smallest number of states from which at least half of a run's reaches started in the evaluations, (N,).
+
+        `checkpoint`: number of problem-tries (attempts to reach one target) before the evaluation, one of `checkpoints`.
+        """
         ordered = -np.sort(-self.chosen(checkpoint), axis=1)
         return np.array([np.searchsorted(np.cumsum(one), 0.5) + 1.0 for one in ordered])
 
     def height(self, checkpoint: int) -> Array:
-        """Return the mean height of the palm in the states that were reached from, minus that in all states, (N,) m."""
+        """Return the mean height of the palm in the states that were reached from, minus that in all states, (N,) m.
+
+        `checkpoint`: number of problem-tries (attempts to reach one target) before the evaluation, one of `checkpoints`.
+        """
         heights = hands_of(reach_space(), MARKER)[:, 2]
         above: Array = self.chosen(checkpoint) @ heights - heights.mean()
         return above
 
     def tried(self, tries: int) -> Array:
-        """Return the share of all pairs of a state and a target that were tried in the first `tries` problem-tries, (N,)."""
+        """Return the share of all pairs of a state and a target that were tried in the first `tries` problem-tries, (N,).
+
+        A problem-try is one attempt to reach one target.
+        """
         return np.array([float((_tried(one, slice(tries)) > 0).mean()) for one in self.values])
 
     def exploration(self, tries: int) -> Array:
         """Return how often each of the 27 targets was tried from each state in the first `tries` problem-tries, (27, S) (fig. 8.7).
 
-        The numbers are means over the runs.
+        The numbers are means over the runs.  A problem-try is one attempt to reach one target.
         """
         mean: Array = np.array([_tried(one, slice(tries)) for one in self.values]).mean(axis=0)
         return mean
@@ -82,7 +96,7 @@ class Runs:
     def concentration(self, first: int, last: int) -> Array:
         """Return the share of reaches that started in the two most frequent states, (N,).
 
-        Counted are the problem-tries from number `first` (counted from 0) up to, but without, `last`.
+        Counted are the problem-tries (attempts to reach one target) from number `first` (counted from 0) up to, but without, `last`.
         """
         sums = [np.sort(_tried(one, slice(first, last)).sum(axis=0))[::-1] for one in self.values]
         return np.array([one[:2].sum() / one.sum() for one in sums])
@@ -92,11 +106,11 @@ class Runs:
         return np.array([float(one["failures"].sum()) for one in self.values])
 
     def hours(self) -> Array:
-        """Return the robot time of the problem-tries of each run, without evaluations, (N,) h."""
+        """Return the robot time of the problem-tries (attempts to reach one target) of each run, without evaluations, (N,) h."""
         return np.array([float(one["hours"]) for one in self.values])
 
     def actions(self) -> Array:
-        """Return the mean number of actions per problem-try of each run, reaches included, (N,)."""
+        """Return the mean number of actions per problem-try (attempt to reach one target) of each run, reaches included, (N,)."""
         return np.array([float(one["mean_actions"]) for one in self.values])
 
 

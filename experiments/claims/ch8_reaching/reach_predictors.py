@@ -67,7 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def places(quick: bool) -> dict[str, Array]:
-    """Return the positions of the targets, (targets, 3) m, root frame, by set: "grid", which are tried, and "between", which never are.
+    """Return a dict from the set of targets ("grid": tried, "between": never tried) to their positions, (targets, 3) m, root frame.
 
     With `quick` there are nine and one instead of 27 and eight.
     """
@@ -179,7 +179,10 @@ def fractions(found: Found) -> Fractions:
 
 
 def evaluated_after(found: Found) -> list[int]:
-    """Return the numbers of problem-tries after which the learners were evaluated; empty if no learner has finished."""
+    """Return the numbers of problem-tries after which the learners were evaluated; empty if no learner has finished.
+
+    A problem-try is one attempt to reach one target.
+    """
     given = [one.cell.settings["checkpoints"] for one in found.values() if "checkpoints" in one.cell.settings]
     return list(given[0]) if given else []
 
@@ -257,7 +260,8 @@ CLAIMS = (*aimed, improves)
 def plot(found: Found) -> Any:
     """Draw the learners' fractions of the oracle's score over the problem-tries, for both sets of targets; crosses are our aims.
 
-    Returns a matplotlib figure.  Raises InvalidValue if no learner or no oracle has finished.
+    Returns a matplotlib figure.  Raises InvalidValue if no learner or no oracle has finished.  A problem-try is one attempt to reach one
+    target.
     """
     curves, at = fractions(found), evaluated_after(found)
     if not curves:

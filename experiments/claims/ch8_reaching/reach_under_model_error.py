@@ -111,7 +111,8 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
     Returns `rows`, a dict for each evaluation: `fates`, `seconds` and `actions` as in `Score`, and `hours`, the plant time so far; and the
     number of `targets`.  For a planner also `planning`, the processor time of each try [s], and `remembered`, the number of poses in its
-    memory.
+    memory.  `settings`: "contestant": "learner", or the planner's kind of memory; "wrong", one of WRONG; "tries", the numbers.  `seed`: of
+    scene and contestant.
     """
     contestant = settings["contestant"]
     scene = make_scene(seed, settings["wrong"])
@@ -143,7 +144,12 @@ class Scene:
     wrong: str
 
     def plant(self, seed: int, ball: bool = True) -> JudgedPlant:
-        """Return a plant of the true arm, with or without the ball, whose reaches are judged by the true poses."""
+        """Return an offline plant of the arm, which measures the results of reaches at the true positions of marker and target.
+
+        If `wrong` is "everyone", encoders and target positions have the errors of the scene, and the control uses them as they are;
+        otherwise they have no such errors.  `seed`: of the plant's random numbers.  `ball`: whether the ball that blocks motions is in the
+        world; no outcome names it as touched.
+        """
         turns = np.zeros(len(body().motors))
         turns[[body().motor_index(name) for name in RIGHT]] = self.turns
         errors = Errors(turns, self.shift) if self.wrong == "everyone" else None
@@ -164,7 +170,7 @@ def make_scene(seed: int, wrong: str) -> Scene:
     """Draw a ball that blocks motions, and errors of joints (3 degrees) and targets (1 cm).
 
     They are the same for every `wrong`, which says whose model has the errors: "nothing", "planners" or "everyone".  Targets that cannot be
-    touched because of the ball are left out.
+    touched because of the ball are left out.  `seed`: of the draw.
     """
     return replace(_drawn(seed), wrong=wrong)
 
@@ -221,7 +227,7 @@ class Score:
     actions: float
 
     def values(self) -> dict[str, Any]:
-        """Return the fields as JSON values by name."""
+        """Return a dict from the name of each field to its JSON value."""
         return {"fates": self.fates.tolist(), "seconds": self.seconds, "actions": self.actions}
 
 

@@ -92,7 +92,8 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
     For the cases, returns arrays (cases,) with keys "scene|contestant|measure"; the measures are "success", "missing" [m], "seconds" (plant
     time) and "thinking" (processor time for plans, s).  For both arms, returns arrays (queries,): "found", "seconds", "smoothing",
-    "corners" and "missing", as in `PlannedQuery`.
+    "corners" and "missing", as in `PlannedQuery`.  `settings`: "scene", "two arms" for paths of both arms, or "cases"; for both arms
+    "queries", for the cases "cases", "transitions" and "tries" of the training: numbers.  `seed`: of learner, cases and planner.
     """
     if settings["scene"] == "two arms":
         queries = [plan_both_arms(1000 * seed + number) for number in range(settings["queries"])]
@@ -116,7 +117,10 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def planned(case: Case, seed: int, motors: MotorParameters | None) -> Attempt:
-    """Let the planner attempt a case of the right arm, and return the result; `motors`: None for the default motors."""
+    """Let the planner attempt a case of the right arm, and return the result.
+
+    `seed`: of plant and planner.  `motors`: parameters of the motors; None: the default ones.
+    """
     plant = JudgedPlant(begun(case, seed, motors))
     start = plant.time
     if case.to is not None:
@@ -143,7 +147,10 @@ class PlannedQuery:
 
 
 def plan_both_arms(seed: int) -> PlannedQuery:
-    """Draw first poses of both arms, plan a path to the cup, and follow it through MoBeE; returns times and remaining error."""
+    """Draw first poses of both arms, plan a path to the cup, and follow it through MoBeE; returns times and remaining error.
+
+    `seed`: of poses, plant and planner.
+    """
     rng = np.random.default_rng([seed, 15])
     model = Model(body(), table_and_cup())
     both = _belief(model, tuple(SIDES))
@@ -256,14 +263,18 @@ def _of(found: Cells, kind: str) -> Runs:
 
 
 def of_cases(cases: Runs, scene: str, contestant: str, measure: str) -> Array:
-    """Return the mean of a measure of `trial` over the cases, for each seed, (seeds,); `cases`: values by seed."""
+    """Return the mean of a measure of `trial` over the cases, for each seed, (seeds,).
+
+    `cases`: the results of `trial` for each seed.  `scene`, `contestant`, `measure`: the three words of a key of the results.
+    """
     return np.array([values[f"{scene}|{contestant}|{measure}"].mean() for values in cases])
 
 
 def of_queries(arms: Runs, measure: str) -> Array:
-    """Return the median of a field of `PlannedQuery` over the queries of each seed, (seeds,); `arms`: values by seed.
+    """Return the median of `measure`, a field of `PlannedQuery`, over the queries of each seed, (seeds,).
 
-    "seconds" is over all queries, the other fields over those with a path; seeds without any are left out.
+    `arms`: the results of `trial` for each seed.  "seconds" is over all queries, the other fields over those with a path; seeds without any
+    are left out.
     """
     counted = [values[measure][slice(None) if measure == "seconds" else values["found"].astype(bool)] for values in arms]
     return np.array([float(np.median(values)) for values in counted if len(values)])

@@ -77,7 +77,8 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     Returns the numbers of `vertices` and `edges` of the roadmap; `invalid` (queries,), the number of edges that the cup blocks; and arrays
     (queries,) with keys "mode|measure".  The modes are "edge" and "around", as in `walked`; the measures "arrived", "bumps", "edges" and
     "seconds", as in `Walk`.  The path around the cup is executed in the first query: `off` is the palm's error at its end, `solid` the
-    depth of the deepest contact of solids, both in m; NaN if there is no such path.
+    depth of the deepest contact of solids, both in m; NaN if there is no such path.  `settings`: "spacing", distance of the roadmap's
+    vertices; "queries", their number.  `seed`: of the queries.
     """
     roadmap = built(settings["spacing"])
     found: dict[str, Any] = {"vertices": len(roadmap.q), "edges": len(roadmap.edges)}

@@ -92,8 +92,9 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Make a walk that tries every transition, or learn with one variant, with an evaluation after given numbers of actions.
 
     A walk returns its transitions `seen` (T, 3).  A learner returns, for L evaluations of R repetitions, `scores` (L, R), NaN before the
-    first target; `tries` and `failed` (L,), the problem-tries and the failed transitions so far; and for each evaluation n its transition
-    model, `outcomes_n` and `probabilities_n` (S, A, B).
+    first target; `tries` and `failed` (L,), the problem-tries (attempts to reach one target) and the failed transitions so far; and for
+    each evaluation n its transition model, `outcomes_n` and `probabilities_n` (S, A, B).  `settings`: "variant", "walk" or one of VARIANTS;
+    "learner", one of LEARNERS; "checkpoints", the L numbers of actions.  `seed`: of agent and plant.
     """
     if settings["variant"] == WALK:
         return {"seen": walk(reach_space(), reach_plant, TRIES, MAX_WALK, seed).astype(np.uint16)}
@@ -140,7 +141,10 @@ class BlamingPlant(WrappedPlant[ReachPlant]):
         self._space, self._blame = space, blame
 
     def act(self, part: str, target: Array) -> Outcome:
-        """Perform an action as `mobee.plant.Plant.act` does; the outcome reports the false contacts that `blame` names."""
+        """Perform an action as `mobee.plant.Plant.act` does; the outcome reports the false contacts that `blame` names.
+
+        `part`, `target`: as in that method.
+        """
         outcome = super().act(part, target)
         arrived = self._space.state_of(outcome.q) == self._space.state_of(target)
         return replace(outcome, touched=() if self._blame == "model" or arrived else (TARGET,))
@@ -151,7 +155,8 @@ class Runs:
     """The N runs of one variant, each evaluated after the L numbers of `actions` (L,).
 
     `scores`, `errors`: (N, L), score and mean L1 error of the transition model; NaN where there was no evaluation.  `observed`: (N, L), the
-    error over the transitions that the model has observed.  `tries`, `failed`: (N,), problem-tries and failed transitions at the end.
+    error over the transitions that the model has observed.  `tries`, `failed`: (N,), problem-tries (attempts to reach one target) and
+    failed transitions at the end.
     """
 
     actions: Ints
@@ -187,7 +192,7 @@ def are_complete(runs: Mapping[str, Runs]) -> bool:
 
 
 def runs_of(found: Cells) -> dict[str, Runs]:
-    """Return the runs of each variant, sorted by seed; the errors are NaN if no walk is finished."""
+    """Return a dict from each variant to its runs, sorted by seed; the errors are NaN if no walk is finished."""
     walks = [values["seen"] for values in grouped(found, "variant", [WALK]).get(WALK, [])]
     truth = truth_of(reach_space(), np.concatenate(walks).astype(np.intp)) if walks else None
     checkpoints_of = {one.cell.settings["variant"]: one.cell.settings.get("checkpoints", []) for one in found.values()}

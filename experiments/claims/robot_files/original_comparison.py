@@ -51,7 +51,8 @@ class Comparison:
 def compare(path: Path, robot: Robot, poses: int, seed: int) -> Comparison:
     """Compare a robot as this library reads it from `path` with the reading of `program_2014.Program`.
 
-    They are compared at home and at `poses` - 1 random positions of the motors within the limits.  Raises ValueError if the volumes differ.
+    They are compared at home and at `poses` - 1 random positions of the motors within the limits, drawn with `seed`.  Raises ValueError if
+    the volumes differ.
     """
     program = Program.read(path)
     low, high = robot.limits.T

@@ -62,7 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Load every file, compare each robot with its reading by the rules of the program of 2014, and write the table.
+    """Load every file, compare each robot with its reading by the rules of MoBeE of 2014, and write the table.
 
     `program_2014` reads a file by these rules, which follow the program's source.  Files that the records in `folder` contain already are
     skipped.  Returns the results.  Raises InvalidValue if no file is found.

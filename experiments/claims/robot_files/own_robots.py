@@ -121,7 +121,7 @@ def results(folder: Path) -> dict[str, Any]:
 
 
 def figure(folder: Path) -> Path:
-    """Write the table with a line per robot to a Markdown file in `folder`; returns its path."""
+    """Write a table of the measurements, one line per robot of the run in `folder`, to a Markdown file there; return the file's path."""
     path = folder / TABLE
     path.write_text("\n".join([*table(read(folder)), ""]), encoding="utf-8")
     return path

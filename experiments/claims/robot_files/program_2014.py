@@ -147,7 +147,10 @@ class Program:
             self.clauses.append(rows)
 
     def poses(self, q: dict[str, float]) -> dict[Node, Array]:
-        """Return the transform (4, 4) of every node, translations in m.  `q`: positions of the motors [deg], by name."""
+        """Return a dict from every node to its transform (4, 4), translations in m.
+
+        `q`: a dict from the name of a motor to its position [deg].
+        """
         placed: dict[Node, Array] = {}
         for node in self.nodes:  # parents come before their children
             carrier = node.parent
@@ -209,13 +212,13 @@ class Program:
     def obeys(self, clause: list[tuple[list[str], list[float], float]], q: dict[str, float]) -> bool:
         """Whether at least one row of a clause holds, that is, the sum of factors times positions plus offset is above 0.
 
-        `q`: positions of the motors [deg], by name.
+        `q`: a dict from the name of a motor to its position [deg].
         """
         return any(sum(a * q[name] for name, a in zip(names, factors, strict=True)) + b > 0 for names, factors, b in clause)
 
 
 def special_euler(axis: Array, angle: float) -> Array:
-    """Return the rotation (3, 3) that gives a volume its height axis, as the program of 2014 computed it.
+    """Return the rotation (3, 3) that gives a volume its height axis, as MoBeE of 2014 computed it.
 
     First a rotation about y brings x to the projection of `axis` (3,) on the x-z plane; then the shortest rotation brings y to `axis`; the
     last rotation, by `angle` [rad], is about `axis`.
@@ -232,7 +235,7 @@ def special_euler(axis: Array, angle: float) -> Array:
 def axis_angle(axis: Array, angle: float) -> Array:
     """Return the rotation (3, 3) by `angle` [rad] about `axis` (3,), which may have any length.
 
-    For length 0 it is cos(angle) times the identity, as in the program of 2014.
+    For length 0 it is cos(angle) times the identity, as in MoBeE of 2014.
     """
     length = np.linalg.norm(axis)
     x, y, z = axis / length if length > 1e-6 else (0.0, 0.0, 0.0)

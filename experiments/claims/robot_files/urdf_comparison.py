@@ -63,8 +63,8 @@ def compare_file(name: str, path: Path, poses: int, seed: int, scratch: Path) ->
     """Load a URDF file, compare it with Pinocchio (frames) and coal (contacts) in random poses, and return the record.
 
     The contacts are compared with exact convex hulls of the meshes, all else with default options.  `name`: of the file, for the record.
-    `poses`: number of random poses.  `scratch`: a folder, where an empty SRDF is written.  Any error while the file is loaded is recorded,
-    not raised.
+    `poses`: number of random poses.  `seed`: of these.  `scratch`: a folder, where an empty SRDF is written.  Any error while the file is
+    loaded is recorded, not raised.
     """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -202,7 +202,7 @@ class UrdfPeer:
         return q
 
     def frames(self, angles: Array) -> dict[str, Array]:
-        """Return the frame (4, 4) of every link, by name.  `angles`: positions of the robot's joints (J,), rad or m."""
+        """Return a dict from the name of every link to its frame (4, 4).  `angles`: positions of the robot's joints (J,), rad or m."""
         self._pin.framesForwardKinematics(self._model, self._data, self._configuration(angles))
         return {name: self._data.oMf[k].homogeneous for name, k in self._frames.items()}
 
@@ -231,7 +231,7 @@ class UrdfPeer:
         make_searches_precise(self._found)
 
     def touching(self, angles: Array) -> dict[LinkPair, float]:
-        """Return the depths [m] of the pairs of links that touch, by pair.  `angles`: positions of the robot's joints (J,), rad or m.
+        """Return a dict from each pair of links that touch to the depth [m].  `angles`: positions of the robot's joints (J,), rad or m.
 
         `read_shapes` must be called before.
         """

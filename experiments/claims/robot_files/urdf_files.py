@@ -98,7 +98,7 @@ def _set_of(one: FileRecord) -> str:
 
 
 def named_folders(given: Sequence[str]) -> dict[str, Path]:
-    """Return the folders in which to look for files, by the name of their set.
+    """Return a dict from the name of a set of files to the folder in which to look for them.
 
     `given`: texts NAME=PATH or PATH; if empty, the installed packages are used.  Raises InvalidValue for a folder that does not exist.
     """

@@ -154,7 +154,8 @@ def measure(name: str, file: Path, minutes: float, actions: int, seed: int) -> M
 def babble(derived: Derived, minutes: float, seed: int) -> tuple[int, float, str]:
     """Let all derived arms of a robot learn at once for `minutes` of robot time.
 
-    Returns the number of transitions, the depth of the deepest solid contact [m], and the names of the two solids.
+    Returns the number of transitions, the depth of the deepest solid contact [m], and the names of the two solids.  `seed`: of agents and
+    plant.
     """
     plant = OfflinePlant(Model(derived.robot), seed, derived.gains, dt=DT, active=[arm.part for arm in derived.arms])
     solids = Model(replace(derived.robot, field_pairs=derived.robot.field_pairs[:0]))
@@ -174,7 +175,7 @@ def babble(derived: Derived, minutes: float, seed: int) -> tuple[int, float, str
 def explore(derived: Derived, actions: int, seed: int) -> tuple[CuriousAgent, set[int]]:
     """Let the arm that moves its end farthest learn alone, and return its agent and the states that it has visited.
 
-    It ends after `actions` transitions, or when every action of every visited state was tried.
+    It ends after `actions` transitions, or when every action of every visited state was tried.  `seed`: of agent and plant.
     """
     arm = max(derived.arms, key=lambda one: one.movement)
     plant = OfflinePlant(Model(derived.robot), seed, derived.gains, dt=DT, active=[arm.part])

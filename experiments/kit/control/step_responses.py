@@ -58,7 +58,7 @@ def postures(count: int, seed: int) -> list[Array]:
     """Draw `count` postures (n,) rad of torso and arms, to be taken one after the other, the first from home.
 
     On the paths to the first posture and from each one to the next, nothing touches, neither solids nor the larger fields around them, and
-    the postures are at least 15 degrees away from every cable constraint.
+    the postures are at least 15 degrees away from every cable constraint.  `seed`: of the draw.
     """
     robot, rng = icub().robot, np.random.default_rng(seed)
     found = [robot.home]

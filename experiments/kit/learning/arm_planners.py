@@ -64,7 +64,7 @@ class Belief:
     def sound_motion(self, start: Array, end: Array, cables: bool = True) -> bool:
         """Return whether all poses on the straight path between two poses (4,) rad are sound: clear of contacts and cable constraints.
 
-        The start pose is not checked.  `cables`: whether the cable constraints count.
+        `start`, `end`: the two poses; the start pose is not checked.  `cables`: whether the cable constraints count.
         """
         count = max(1, int(np.ceil(np.abs((end - start) / self.span).max() / STEP)))
         shares = np.arange(1, count + 1)[:, None] / count
@@ -158,7 +158,7 @@ class Roadmap:
 
 
 def edge(first: int, second: int) -> Edge:
-    """Return the undirected edge between two vertices: a pair with the smaller number first."""
+    """Return the undirected edge between the vertices `first` and `second`: a pair with the smaller number first."""
     return (first, second) if first < second else (second, first)
 
 
@@ -194,6 +194,7 @@ def ompl_roadmap(belief: Belief, milestones: int, neighbours: int, seed: int) ->
     """Build a PRM over the arm's four joints with OMPL; distances are in fractions of the joints' ranges.  Raises OmplMissing.
 
     `milestones`: number of vertices.  `neighbours`: number of nearest vertices to which each vertex is joined if the motion is sound.
+    `seed`: of the samples.
     """
     found = grown("PRM", belief, milestones, neighbours, seed, resolution=STEP)
     return Roadmap(found.q, [(v, w) for v, w in found.edges.tolist()], belief)
@@ -233,7 +234,10 @@ class Straight:
         return sample
 
     def observe(self, start: Array, end: Array) -> None:
-        """Do nothing: this planner learns nothing from the outcomes of motions (`Rival.observe`)."""
+        """Do nothing: this planner learns nothing from the outcomes of motions (`Rival.observe`).
+
+        `start`, `end`: as in that method.
+        """
 
 
 class PlannedOnce:
@@ -263,7 +267,10 @@ class PlannedOnce:
         return None if vertex is None else self._roadmap.pose(vertex)
 
     def observe(self, start: Array, end: Array) -> None:
-        """Do nothing: this planner does not react to the outcomes of motions (`Rival.observe`)."""
+        """Do nothing: this planner does not react to the outcomes of motions (`Rival.observe`).
+
+        `start`, `end`: as in that method.
+        """
 
 
 class Repaired:

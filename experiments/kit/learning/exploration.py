@@ -86,7 +86,10 @@ class Log:
     poses: list[Array] = field(default_factory=list)
 
     def arrays(self, part: str, count: int) -> dict[str, Any]:
-        """Return seen, settled, durations and ends of the first `count` transitions as arrays, by keys such as "seen_left_arm"."""
+        """Return seen, settled, durations and ends of the first `count` transitions as arrays.
+
+        The keys end with the name `part`, as "seen_left_arm".
+        """
         return {
             f"seen_{part}": np.array(self.seen[:count], dtype=np.uint16),
             f"settled_{part}": np.array(self.settled[:count], dtype=bool),
@@ -96,7 +99,7 @@ class Log:
 
 
 def explore_together(agents: Sequence[CuriousAgent], plant: OfflinePlant, transitions: int) -> dict[str, Log]:
-    """Let several agents act at the same time on one plant, as `mobee.run` does, and return the transitions by part.
+    """Let several agents act at the same time on one plant, as `mobee.run` does, and return a dict from the part to its transitions.
 
     The run ends when every agent has made `transitions` transitions; faster agents make more in the meantime.
     """

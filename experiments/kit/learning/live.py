@@ -95,13 +95,19 @@ def space(robot: Robot, task: Task, part: str) -> Lattice:
 
 
 def offline_plant(task: Task, seed: int) -> OfflinePlant:
-    """Return a plant of the whole iCub in the world of the task, with the motor model that was identified on PyBullet."""
+    """Return a plant of the whole iCub in the world of the task, with the motor model that was identified on PyBullet.
+
+    `seed`: of the plant.
+    """
     model = Model(load_robot(ROBOT), load_world(task.world))
     return OfflinePlant(model, seed, Gains.named(GAINS), MotorParameters.identified(ROBOT), 1.0 / RATE)
 
 
 def agents(task: Task, plant: Plant, seed: int) -> list[CuriousAgent]:
-    """Return an agent for each part of the task, with the settings that the agents of the live system (`services.agents`) have."""
+    """Return an agent for each part of the task, with the settings that the agents of the live system (`services.agents`) have.
+
+    `seed`: of the agents.
+    """
     return [CuriousAgent(space(plant.robot, task, part), plant, seed=seed) for part in task.parts]
 
 
@@ -311,7 +317,7 @@ class Contacts:
 
 
 def contacts(folder: Path, task: str) -> dict[str, dict[str, Contacts]]:
-    """Return how the actions of a task ended, by robot and part; under "offline" for all offline runs together.
+    """Return a dict from the robot ("offline": all offline runs together) to a dict from the part to how its actions ended.
 
     `folder`: folder of the experiment's run.  `task`: "arms", "table" or "published".
     """

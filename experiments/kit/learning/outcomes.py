@@ -24,7 +24,7 @@ UNCERTAIN = (0.1, 0.9)  # shares of failures between which the outcome of an act
 
 
 def in_order(seen: Ints) -> Ints:
-    """Return the transitions (T, 3) sorted by state, action and outcome.
+    """Return the transitions `seen` (T, 3) sorted by state, action and outcome.
 
     Sorted transitions compress much better.  They are sufficient if only counts are computed from them, because the order in time is lost.
     """
@@ -187,7 +187,7 @@ def relative_tries_of(judged: Sequence[Explored], runs: Sequence[Explored]) -> l
 def draw_tries(axes: Any, tries: Ints, chosen: NDArray[np.bool_], width: float, label: str) -> None:
     """Draw the tries (E,) of every state-action as bars.
 
-    `chosen`: mask (E,) of the bars that are red, `width` wide and named `label` in the legend; the others are grey.
+    `chosen`: mask (E,) of the bars that are red, `width` wide and named `label` in the legend; the others are grey.  `axes`: of Matplotlib.
     """
     number = np.arange(len(tries))
     draw_heights(axes, np.where(chosen, 0, tries), color="0.6", label="others")

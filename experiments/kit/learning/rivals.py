@@ -37,7 +37,10 @@ class RewardedPlant(TabularPlant):
         self.largest = float(self.truth.max())
 
     def act(self, part: str, target: Array) -> Outcome:
-        """Perform the action with the number `target[1]` in the present state, and record its reward; returns the outcome."""
+        """Perform the action with the number `target[1]` in the present state, and record its reward; returns the outcome.
+
+        `part`: as in `mobee.plant.Plant.act`.
+        """
         at = self.state, int(target[1])
         outcome = super().act(part, target)
         self.known[at] = self.truth[at]
@@ -185,8 +188,8 @@ def rooms(width: int = 11, slip: float = 0.1) -> TabularWorld:
 def random_world(seed: int, states: int = 50, actions: int = 4, branches: int = 5) -> TabularWorld:
     """Return a world in which each action leads to `branches` random states with random probabilities (Archibald et al. 1995).
 
-    Every action of a state has the same reward: 0 in state 0, 1 in the last state; each other state has with probability 0.1 a reward drawn
-    uniformly from 0 to 1, else 0.
+    `seed`: of the draw.  Every action of a state has the same reward: 0 in state 0, 1 in the last state; each other state has with
+    probability 0.1 a reward drawn uniformly from 0 to 1, else 0.
     """
     rng = np.random.default_rng(seed)
     outcomes = np.array([[rng.choice(states, branches, replace=False) for _ in range(actions)] for _ in range(states)])

@@ -55,7 +55,7 @@ class Observer:
         motions: changes of a part's motion, by part: time of arrival [s], status, action.
         published: state, action, state reached, settled, duration, by agent and number of the transition.
         conflicts: a line for each number under which an agent published two different transitions.
-        locked: whether the robot runs in lockstep.
+        locked: whether the robot runs in lockstep (every tick waits for all participants).
         lock: held while the other fields change.
     """
 
@@ -120,14 +120,14 @@ class Observer:
             return self.parts[part][-1] if self.parts.get(part) else None
 
     def all_armed(self, count: int) -> bool:
-        """Return whether there are `count` parts, and all of them are armed, by states that are not older than 0.5 s."""
+        """Return whether there are `count` parts, and all are armed (follow commands), by states that are not older than 0.5 s."""
         since = time.monotonic() - FRESH
         with self.lock:
             newest = [states[-1] for states in self.parts.values()]
         return len(newest) == count and all(one.gate == "armed" and one.at > since for one in newest)
 
     def take(self) -> tuple[dict[str, list[Moment]], list[float]]:
-        """Return the states so far by part, and the ages [s] of the commands that they obeyed; keep only the last state of each part.
+        """Return a dict from the part to its states so far, and the ages [s] of the commands obeyed; keep only the last state of each part.
 
         The age of a command is the time from the beginning of the tick that it answers to the beginning of the tick in which the robot
         obeyed it. It is a lower bound: a tick is published after the gate has judged its command, and a busy machine may take long between
@@ -190,8 +190,8 @@ def survived(changes: list[tuple[float, str, str]], fault: float, until: float) 
 def violations(states: Mapping[str, list[Moment]], robot: Robot, noise: float) -> list[str]:
     """Return a line of text for each broken promise of the system in the states of one schedule of faults.
 
-    The promises: within a run time never decreases, and no motor is faster than the gate allows.  In lockstep, tick 0 may be repeated until
-    all services have answered.  `states`: by part.  `noise`: largest error of the encoders, rad.
+    The promises: within a run time never decreases, and no motor is faster than the safety gate of robot_sim allows.  In lockstep, tick 0
+    may be repeated until all services have answered.  `states`: by part.  `noise`: largest error of the encoders, rad.
     """
     found = []
     for part, moments in states.items():

@@ -50,7 +50,7 @@ class Law:
 
 @cache
 def laws() -> dict[str, Law]:
-    """Return the two control laws by name, "published" and "default".
+    """Return a dict from "published" and "default" to these two control laws.
 
     Under the published law the attractor stays at its place during a reach and pulls against the reach's force; under the default law the
     marker arrives at the target.
@@ -90,7 +90,7 @@ def learned_beliefs(plant: OfflinePlant, seed: int, transitions: int = TRANSITIO
 
 @cache
 def body(law: str = "default") -> Robot:
-    """Return today's robot for the law "default", the robot of 2014 for the law "published"; every call returns the same object."""
+    """Return today's robot for the control law "default", the robot of 2014 for the law "published"; every call returns the same object."""
     return published_robot() if law == "published" else mobee.load_robot("icub")
 
 
@@ -226,7 +226,10 @@ class JudgedPlant(WrappedPlant[OfflinePlant]):
         return self.inner.settings | {"errors": errors, "unseen": sorted(self._unseen)}
 
     def act(self, part: str, target: Array) -> Outcome:
-        """Perform the action on the inner plant, as in `mobee.plant.Plant.act`; the outcome has no contacts with unseen objects."""
+        """Perform the action on the inner plant, as in `mobee.plant.Plant.act`; the outcome has no contacts with unseen objects.
+
+        `part`, `target`: as in that method.
+        """
         return self._reported(super().act(part, target))
 
     def go(self, part: str, target: Array, marker: str) -> Outcome:

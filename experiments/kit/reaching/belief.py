@@ -42,7 +42,7 @@ class PeerBelief:
         motors: names of the d motors with which motions are planned; all others stay at home.
         marker: the marker that is brought to the target.
         clauses: the clauses that the planner knows.
-        gains: gains of the law under which motions are executed.
+        gains: gains of the control law under which motions are executed.
         turns: (d,) rad, error of the encoders as the planner believes it: believed minus measured angles of the motors; None: 0.
     """
 
@@ -101,7 +101,7 @@ class PeerBelief:
         return good
 
     def sound_motion(self, start: Array, end: Array, care: Care = "solids") -> bool:
-        """Return whether all poses on the straight path between two poses (d,) rad are sound; the start pose is not checked.
+        """Return whether all poses on the straight path from `start` to `end` (d,) rad are sound; the start pose is not checked.
 
         "Sound" and the values of `care`, the set of forbidden contacts, are explained at `PeerBelief.sound`.  `checked` is increased by the
         number of checked poses.

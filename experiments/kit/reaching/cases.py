@@ -157,7 +157,7 @@ class Attempt:
     """The result of an attempt.
 
     `missing`: distance of the palm from the target's surface at the end [m].  `seconds`: plant time.  `thinking`: processor time for plans
-    [s]. `reward`: thesis eq. 8.4, of the distance from the point at which the law aims (centre or surface).
+    [s]. `reward`: thesis eq. 8.4, of the distance from the point at which the control law aims (centre or surface).
     """
 
     missing: float
@@ -184,8 +184,8 @@ def attempt(method: str, agent: ReachAgent, case: Case, seed: int, motors: Motor
 
     `method`: "planner": move to a state with the palm near the target, without a reach; "reach": reach from the start pose; "both": move to
     the state with the highest expected reward of reaching, then reach.  In a reach, a force pulls the palm to the target.  A reach that
-    misses is repeated, up to REACHES times in all (1 for the law "published", 3 for "default"). `agent`: the trained learner.  `seed`: seed
-    of the plant and of choices.  `motors`: motor parameters; None: the default ones.  `law`: "default" or "published".
+    misses is repeated, up to REACHES times in all (1 for the control law "published", 3 for "default"). `agent`: the trained learner.
+    `seed`: seed of the plant and of choices.  `motors`: motor parameters; None: the default ones.  `law`: "default" or "published".
     """
     plant = begun(case, seed, motors, law)
     start = plant.time

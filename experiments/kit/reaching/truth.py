@@ -85,7 +85,10 @@ def load_truth(path: Path) -> Truth:
 
 
 def truth_of(measured: Mapping[tuple[float, ...], Mapping[str, Any]]) -> Truth:
-    """Return the results of several targets from the values of their cells (`Tried.values`), by position of the target."""
+    """Return the results of several targets.
+
+    `measured`: a dict from the position of a target (3,) m to the values of its cell, as `Tried.values` returns them.
+    """
     each = list(measured.values())
     made = np.array([one["made"] for one in each])
     with np.errstate(invalid="ignore"):
@@ -189,8 +192,8 @@ class Known:
 def oracle(truth: Truth, space: Space, plant: OfflinePlant, beliefs: OutcomeModel, marker: str, scale: float, seed: int) -> ReachAgent:
     """Return an agent that knows the true rewards and the blocked transitions; it is to be evaluated on the measured targets.
 
-    `truth`: the measured results.  `beliefs`: transition model without targets.  `scale`: unit of the remaining error in the reward, m. A
-    transition counts as blocked if at least half of its tries failed.
+    `truth`: the measured results.  `marker`: name of the marker that reaches.  `seed`: of the agent.  `beliefs`: transition model without
+    targets.  `scale`: unit of the remaining error in the reward, m.  A transition counts as blocked if at least half of its tries failed.
     """
     known = Known(truth, scale)
     agent = ReachAgent(space, plant, beliefs, marker=marker, predictor=known, strategy="greedy", failures="local", scale=scale, seed=seed)

@@ -22,7 +22,7 @@ class Progress:
     """A strategy for learning progress: the reward of a reach from a state is how much this state's rewards have changed recently.
 
     The mean of the newer half of its last eight rewards is compared with that of the older half; the reward is 1 if it has fewer than two.
-    In one of five problem-tries the reward is 1 for a random state and 0 for all others.
+    In one of five problem-tries (attempts to reach one target) the reward is 1 for a random state and 0 for all others.
     """
 
     def __init__(self, reaches: Reaches, predictor: RewardPredictor) -> None:
@@ -68,13 +68,16 @@ class Strategy(Protocol):
     def rewards(self, target: Array, rng: np.random.Generator) -> Array:
         """Return the reward of a reach from each state for a target (3,) m, shape (S,).
 
-        `rng`: random generator; within one problem-try it always starts in the same state.
+        `rng`: random generator; within one problem-try (attempt to reach one target) it always starts in the same state.
         """
         ...
 
 
 class Random:
-    """A strategy: the reward of a reach is 1 from one state, drawn for each problem-try, and 0 from all others (thesis 8.3.2)."""
+    """A strategy: the reward of a reach is 1 from one state, drawn for each problem-try, and 0 from all others (thesis 8.3.2).
+
+    A problem-try is one attempt to reach one target.
+    """
 
     def __init__(self, reaches: Reaches, predictor: RewardPredictor) -> None:
         self._states = len(reaches)
@@ -132,7 +135,7 @@ class UpperBound(Greedy):
 class Thompson(Greedy):
     """A strategy: the rewards of all reaches are one random sample from the predictor, drawn for each problem-try (Thompson sampling).
 
-    It needs a predictor that can be sampled.
+    It needs a predictor that can be sampled. A problem-try is one attempt to reach one target.
     """
 
     def rewards(self, target: Array, rng: np.random.Generator) -> Array:

@@ -14,7 +14,10 @@ from mobee.reach import ReachTarget
 
 
 class Problems:
-    """The targets that were tried, numbered in the order of their first problem-tries, and how often each was tried."""
+    """The targets that were tried, numbered in the order of their first problem-tries, and how often each was tried.
+
+    A problem-try is one attempt to reach one target.
+    """
 
     def __init__(self) -> None:
         self.targets: list[ReachTarget] = []
@@ -37,7 +40,7 @@ class Problems:
     def least_tried(self, targets: Sequence[ReachTarget], rng: np.random.Generator) -> ReachTarget:
         """Return the target with the fewest problem-tries; if several have it, a random one of them (thesis 8.3.2).
 
-        Raises InvalidValue if `targets` is empty.
+        Raises InvalidValue if `targets` is empty. A problem-try is one attempt to reach one target.
         """
         if not targets:
             raise InvalidValue("there are no problems to choose from: give at least one target.")
@@ -54,7 +57,7 @@ def place(target: ReachTarget) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One action of a problem-try: a transition, or the reach.
+    """One action of a problem-try (attempt to reach one target): a transition, or the reach.
 
     `n`: number of the step, 1, 2, ... `number`: number of its problem-try, 1, 2, ... `problem`: number of its target, 0, 1, ... `s`,
     `s_next`: states before and after. `a`: the action of a transition, or REACH (-1). `failed`: whether a transition led to no state of
@@ -82,7 +85,7 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Try:
-    """A problem-try that has ended.
+    """A problem-try (attempt to reach one target) that has ended.
 
     `number`: its number, 1, 2, ... `problem`: number of its target. `path`: its transitions, each as (state, action, next state, failed).
     `reach_state`: the state where the reach started; None: the try ended at the limit of actions without a reach. `reward`, `expected`:
@@ -104,12 +107,12 @@ class Try:
 
     @property
     def failures(self) -> int:
-        """The number of transitions of this problem-try that failed."""
+        """The number of transitions of this problem-try (attempt to reach one target) that failed."""
         return sum(failed for _, _, _, failed in self.path)
 
 
 def made_of(steps: Sequence[Step]) -> Try:
-    """Return the problem-try that consists of these steps, in order; at least one is needed."""
+    """Return the problem-try (attempt to reach one target) that consists of these steps, in order; at least one is needed."""
     moves, last = [step for step in steps if step.a != REACH], steps[-1]
     reached = last.a == REACH
     return Try(

@@ -170,7 +170,7 @@ class AdaptiveRoadmap:
         return int(found[0]) if len(found) else None
 
     def grow(self, samples: ArrayLike, neighbours: int = NEIGHBOURS) -> Ints:
-        """Add poses of the joints (N, d) rad as vertices; return the numbers of the new vertices, (N,).
+        """Add `samples`, poses of the d joints (N, d) rad, as vertices; return the numbers of the new vertices, (N,).
 
         Each new vertex gets edges to and from its `neighbours` nearest vertices; distances are measured in ranges of the joints.
         """
@@ -187,7 +187,7 @@ class AdaptiveRoadmap:
         return np.arange(old, len(poses))
 
     def join(self, state: int, samples: ArrayLike, goal: int) -> Ints:
-        """Add a path in both directions between the vertices `state` and `goal`, through K >= 1 new poses of the joints (K, d) rad.
+        """Add a path in both directions between the vertices `state` and `goal`, through `samples`, K >= 1 new poses (K, d) rad.
 
         Returns the numbers of the new vertices, (K,). A path that a single-query planner has found can thus repair a vertex without usable
         edges.
@@ -202,9 +202,9 @@ class AdaptiveRoadmap:
     def prune(self, start: int) -> Ints:
         """Remove the vertices that cannot be reached from vertex `start`; return the new number of every vertex, (S,), -1 for removed ones.
 
-        With the mode "remove", failed edges of the remaining vertices are removed too. A vertex always keeps at least one edge: if all its
-        edges failed, these remain; if all its edges led to removed vertices, it gets a new edge to the nearest vertex. Raises MobeeError if
-        no other vertex can be reached from `start`.
+        If `mode` of the roadmap is "remove", failed edges of the remaining vertices are removed too. A vertex always keeps at least one
+        edge: if all its edges failed, these remain; if all its edges led to removed vertices, it gets a new edge to the nearest vertex.
+        Raises MobeeError if no other vertex can be reached from `start`.
         """
         kept = np.flatnonzero(self.reachable(start))
         if len(kept) < 2:

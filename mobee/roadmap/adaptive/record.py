@@ -54,7 +54,7 @@ class MapStore(TransitionStore):
                 self._db.execute(TABLE)
 
     def changed(self, what: str, **given: Any) -> None:
-        """Commit a change of the map; it is on disk when the method returns.
+        """Commit a change of the roadmap; it is on disk when the method returns.
 
         `what`: name of the method of AdaptiveRoadmap. `given`: its arguments, plain JSON values.
         """
@@ -85,7 +85,7 @@ class MapRecord:
 
     Args:
         roadmap: the map. If the store has content, the recorded observations and changes are applied to it.
-        store: the file; None: nothing is written.
+        store: the file of observations and changes; None: nothing is written.
         settings: settings of the walker or explorer, which must equal those in the store.
 
     Raises:
@@ -125,7 +125,7 @@ class MapRecord:
         self._learn(made)
 
     def change(self, what: str, **given: Any) -> Any:
-        """Change the map and record the change; return the result of the method.
+        """Change the roadmap and record the change; return the result of the method.
 
         `what`: name of the method of AdaptiveRoadmap, "grow", "join" or "prune". `given`: its arguments, plain JSON values. Raises
         UnknownName for another method.

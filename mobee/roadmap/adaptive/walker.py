@@ -71,7 +71,7 @@ class Walker:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The settings that determine the walker's behaviour, with those of the map but without the plant, as plain JSON values."""
+        """The settings that determine the walker's behaviour, with those of the roadmap but without the plant, as plain JSON values."""
         return {"roadmap": self.roadmap.settings, "near": self.near, "back": self.back}
 
     def go(self, goals: ArrayLike, most: int | None = None) -> Walk:
@@ -93,7 +93,7 @@ class Walker:
     def follow(self, state: int, goal: int) -> bool:
         """Move along the edge from vertex `state` to vertex `goal` and record the outcome; return whether the motion succeeded.
 
-        After a failure the part moves back to `state` if `back` is set. Raises InvalidValue if the map has no such edge, and
+        After a failure the part moves back to `state` if `back` is set. Raises InvalidValue if the roadmap has no such edge, and
         ActionInterrupted if the plant interrupts an action.
         """
         action = self.roadmap.action(state, goal)

@@ -149,7 +149,7 @@ class Checkpoint:
     def run(self, name: str, builder: Builder) -> None:
         """Run all steps of a builder; `name`: name of this stage of the building.
 
-        If the existing file was written in the same stage, the builder continues from the state in the file.
+        If a file of an unfinished roadmap was written in the same stage, the builder continues from the state in that file.
         """
         if self._found is not None and self.stage == name:
             arrays, notes = self._found
@@ -179,7 +179,7 @@ class Checkpoint:
             self._progress(Progress(vertices, evaluations, open, self._reported - self._began))
 
     def finish(self, q: Array, y: Array, evaluations: int) -> Roadmap:
-        """Return the finished roadmap and save it to the file, if there is one.
+        """Return the finished roadmap and save it to the .npz file, if one was given.
 
         `q`: (V, n) rad, poses. `y`: (V, m) task coordinates. `evaluations`: number of evaluated poses. Raises MobeeError if the robot or
         the world has changed since the start of the building.

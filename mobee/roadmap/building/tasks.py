@@ -28,9 +28,9 @@ Range = tuple[float, float]
 class Coordinate:
     """One task coordinate y_i: a number computed from a pose, and the range that the roadmap covers.
 
-    `low`, `high`: the range, in the unit. `unit`: "m", "rad" or "". `function`: computes the coordinate (N,) of a batch of poses q (N, n).
-    `aims`: function of the robot and a value that returns the residuals by which least squares reaches the value; None if the coordinate
-    has no derivative. Raises InvalidValue unless low < high.
+    `low`, `high`: the range, in `unit`. `unit`: that of the coordinate, "m", "rad" or "" (no unit). `function`: computes the coordinate
+    (N,) of a batch of poses q (N, n). `aims`: function of the robot and a value that returns the residuals by which least squares reaches
+    the value; None if the coordinate has no derivative. Raises InvalidValue unless low < high.
     """
 
     name: str

@@ -21,10 +21,10 @@ class PathRates:
     Attributes:
         weights: (population,), best sample first; the weights of the better half are positive and their sum is 1, the others are negative.
         effective: effective number of samples in the better half.
-        path: decay of the path per generation.
+        path: decay of the evolution path (a mean of recent steps of the search) per generation.
         damping: damping of the changes of the step size.
-        rank_one: learning rate of the shape from the path.
-        rank_all: learning rate of the shape from the samples.
+        rank_one: learning rate of the shape matrix of the search distribution from the path.
+        rank_all: learning rate of the shape matrix from the samples.
         length: mean length of a standard normal vector.
     """
 
@@ -38,9 +38,10 @@ class PathRates:
 
 
 def path_rates(dimensions: int, population: int, separable: bool = False) -> PathRates:
-    """Return the default rates for d = `dimensions` and a number of samples per generation.
+    """Return the default sample weights and learning rates of an evolution strategy with an evolution path, those of CMA-ES.
 
-    `separable`: for a diagonal shape, which has fewer parameters, so that it can be learned faster (Ros and Hansen 2008).
+    `dimensions`: number of variables of the search. `population`: number of samples per generation. `separable`: True: for a search
+    distribution with a diagonal shape matrix, which has fewer parameters, so that it can be learned faster (Ros and Hansen 2008).
     """
     d = dimensions
     weights = math.log((population + 1) / 2) - np.log(np.arange(1, population + 1))

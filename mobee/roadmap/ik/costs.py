@@ -64,7 +64,7 @@ def units(vectors: Array) -> Array:
 
 
 def angle_between(one: Array, other: Array) -> Array:
-    """Return the angles (...,) rad between unit vectors (..., 3); exact also near 0 and near pi."""
+    """Return the angles (...,) rad between the unit vectors `one` and `other`, (..., 3) each; exact also near 0 and near pi."""
     angle: Array = 2.0 * np.arctan2(lengths(one - other), lengths(one + other))
     return angle
 
@@ -138,7 +138,8 @@ def orientation(
 def hold(first: str, second: str, distance: float, tolerance: float = METRES, weight: float = PER_METRE) -> Term:
     """Return the term that keeps two markers at a `distance` [m] from each other (table 3.1); the residual is the distance's error [m].
 
-    A residual of at most `tolerance` (5 mm) meets the term; the cost is `weight` (20 per m) times the residual.
+    A residual of at most `tolerance` (5 mm) meets the term; the cost is `weight` (20 per m) times the residual. `first`, `second`: names of
+    the markers.
     """
 
     def residual(pose: Pose) -> Array:
@@ -155,7 +156,8 @@ def hold(first: str, second: str, distance: float, tolerance: float = METRES, we
 def palm_to_palm(first: str = "left_palm", second: str = "right_palm", tolerance: float = RADIANS, weight: float = PER_RAD) -> Term:
     """Return the term that points the normal of each of two markers at the other marker; its residual is the larger angle [rad].
 
-    A residual of at most `tolerance` (5 degrees) meets the term; the cost is `weight` (2 per rad) times the residual.
+    A residual of at most `tolerance` (5 degrees) meets the term; the cost is `weight` (2 per rad) times the residual. `first`, `second`:
+    names of the markers.
     """
 
     def residual(pose: Pose) -> Array:
@@ -327,7 +329,7 @@ def relative_position(marker: str, to: str, place: ArrayLike, tolerance: float =
 
 
 def relative_orientation(marker: str, to: str, goal: ArrayLike, tolerance: float = RADIANS, weight: float = PER_RAD) -> Term:
-    """Return the term that turns a marker to a rotation (3, 3) in the frame of the marker `to`; its residual is the angle [rad].
+    """Return the term that turns a marker to the rotation `goal` (3, 3) in the frame of the marker `to`; its residual is the angle [rad].
 
     With the identity both markers have the same orientation. A residual of at most `tolerance` (5 degrees) meets the term; the cost is
     `weight` (2 per rad) times the residual.

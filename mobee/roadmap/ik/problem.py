@@ -125,7 +125,7 @@ class Problem:
         self.evaluations = 0
 
     def whole(self, samples: Array) -> Array:
-        """Return poses of all motors (N, n) rad from positions of the motors that may move (N, d) rad; the others are at the start."""
+        """Return poses of all motors (N, n) rad from `samples` (N, d) rad of the motors that may move; the others are at the start."""
         q = np.repeat(self.start[None], len(samples), axis=0)
         q[:, self.free] = samples
         return q

@@ -134,7 +134,7 @@ def compile_mjcf(path: Path) -> Compiled:
 
 @lru_cache(maxsize=2)
 def meshes_of(path: Path) -> dict[str, tuple[Array, Ints]]:
-    """Return the vertices (v, 3) m and the triangles (t, 3), indices of vertices, of each mesh of an MJCF file, by the mesh's name.
+    """Return a dict from the name of each mesh of an MJCF file to its vertices (v, 3) m and its triangles (t, 3), indices of vertices.
 
     The vertices are in the frame of the geom that has the mesh. Raises RobotFileError if MuJoCo refuses the file, NotInstalled without the
     package mujoco.

@@ -15,7 +15,7 @@ Line = tuple[int, int, float, float]  # joint one = scale * joint other + offset
 
 
 def drives_of(compiled: Compiled) -> dict[int, Drive]:
-    """Return the drive (motor, scale and offset) of each hinge and slide that moves, by MuJoCo's number of the joint.
+    """Return a dict from MuJoCo's number of each hinge and slide that moves to its drive (motor, scale and offset).
 
     A joint equality couples its two joints. An actuator of a fixed tendon moves the joints of the tendon together, in proportion to
     their coefficients, unless one of these joints has an actuator. A group of coupled joints has one motor, which is named after the joint

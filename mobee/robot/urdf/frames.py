@@ -70,7 +70,7 @@ def bounded(node: Node, name: str, default: float | None = None) -> float:
 
 
 def rotation_of(rpy: Array) -> Array:
-    """Return the rotation matrix (3, 3) of roll, pitch and yaw (3,) [rad]: rotations about the fixed axes x, y and z, in this order."""
+    """Return the rotation matrix (3, 3) of `rpy`: roll, pitch, yaw (3,) rad: rotations about the fixed axes x, y and z, in this order."""
     (sr, sp, sy), (cr, cp, cy) = np.sin(rpy), np.cos(rpy)
     return np.array(
         [

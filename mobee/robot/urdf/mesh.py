@@ -80,7 +80,7 @@ def mesh_name(mesh: MeshSource, path: Path) -> str:
 
 
 def first_file(candidates: list[Path]) -> Path | None:
-    """Return the first of the paths that is an existing file; None if there is none."""
+    """Return the first of the `candidates` that is an existing file; None if there is none."""
     return next((path for path in candidates if is_file(path)), None)
 
 

@@ -34,7 +34,7 @@ class Drive:
 
 
 def read_drives(joints: Mapping[str, UrdfJoint], moving: Sequence[UrdfJoint]) -> dict[str, Drive]:
-    """Return the drive of each moving joint, by the joint's name; chains of <mimic> are followed to the joint at their end.
+    """Return a dict from the name of each moving joint to its drive; chains of <mimic> are followed to the joint at their end.
 
     `joints`: all joints, by name. `moving`: the joints that move. Raises RobotFileError for cycles of <mimic> and unknown joints.
     """

@@ -47,7 +47,7 @@ def adjacent_links(joints: Sequence[Joint], shapes: Sequence[Shape]) -> dict[Lin
     """Return the pairs of adjacent links (indices), each with the reason as text.
 
     Two links are adjacent if one joint connects them, or several joints at one place (within 5 cm) with links between them that have no
-    solid.
+    solid. `joints`, `shapes`: of the robot.
     """
     solid = {shape.link for shape in shapes if shape.role == "solid"}
     found: dict[LinkPair, str] = {}
@@ -69,8 +69,8 @@ def adjacent_links(joints: Sequence[Joint], shapes: Sequence[Shape]) -> dict[Lin
 def shape_pairs(joints: Sequence[Joint], shapes: Sequence[Shape], owners: Sequence[str], role: str, rules: PairRules) -> Ints:
     """Return the pairs of shapes of one role ("solid" or "field") that are tested for contacts, (p, 2), indices in `shapes`.
 
-    A field is a volume that causes a repulsive force. `owners`: for each shape the name of its URDF link. `rules`: the pairs of links and
-    the fields that are not tested.
+    A field is a volume that causes a repulsive force. `joints`, `shapes`: of the robot. `owners`: for each shape the name of its URDF link.
+    `rules`: the pairs of links and the fields that are not tested.
     """
     chosen = np.array([index for index, shape in enumerate(shapes) if shape.role == role], dtype=np.intp)
     names = {name: k for k, name in enumerate(rules.links)}

@@ -19,7 +19,7 @@ HEAVIEST = 1e6  # kg
 
 
 def read_mass(node: Node, draft: Draft, place: Place) -> None:
-    """Read a <mass> and add it to the draft; several masses on one link are added up later. Raises RobotFileError."""
+    """Read a <mass> and add it to the draft; several masses on one link are added up later. RobotFileError if it is not valid."""
     mass = node.positive("value", unit="kilograms")
     if mass > HEAVIEST:
         node.fail("value", f"{mass:g} is too large", "Masses are in kilograms")
@@ -54,7 +54,7 @@ def read_skeleton(node: Node, draft: Draft, place: Place, centre: Array, axis: A
     """Add to the draft the solid and the field that the attributes `radius` and `field` of a <link> or <joint> describe.
 
     Both are cylinders; a field is a volume that causes a repulsive force. `centre`: (3,) m, root frame. `axis`: (3,), of any length.
-    `length`: m. Raises RobotFileError.
+    `length`: m. Raises RobotFileError if the element is not valid.
     """
     for attribute, role in (("radius", "solid"), ("field", "field")):
         if node.number(attribute, 0.0) == 0:
@@ -77,7 +77,7 @@ def read_skeleton(node: Node, draft: Draft, place: Place, centre: Array, axis: A
 
 
 def read_shape(node: Node, draft: Draft, place: Place) -> None:
-    """Read a <sphere>, <capsule>, <cylinder>, <box> or <convex> and add its solid or field to the draft; raises RobotFileError.
+    """Read a <sphere>, <capsule>, <cylinder>, <box> or <convex> and add its solid or field to the draft; RobotFileError if invalid.
 
     A field, a shape with the attribute `field`, is a volume that causes a repulsive force.
     """
@@ -115,7 +115,7 @@ def free_name(draft: Draft, name: str) -> str:
 
 
 def read_marker(node: Node, draft: Draft, place: Place) -> None:
-    """Read a <marker> and add it to the draft; raises RobotFileError.
+    """Read a <marker> and add it to the draft; raises RobotFileError if it is not valid.
 
     Without a normal in the file the normal is the z axis of the marker's rotation, or +x if there is no rotation either. Without a
     rotation in the file it is the smallest rotation that turns z to the normal.

@@ -39,7 +39,10 @@ class MotorDraft:
 
 
 def read_motor(node: Node, part: str, count: int) -> MotorDraft:
-    """Return the motor that a <motor> element describes; `count`: number of motors before it. Raises RobotFileError."""
+    """Return the motor that a <motor> element describes; raises RobotFileError if it is not valid.
+
+    `part`: name of its part. `count`: number of motors before it.
+    """
     low, high = node.number("minPos"), node.number("maxPos")
     unit = node.choice("unit", node.optional("unit") or UNITS[0], UNITS, "unit")
     if low == high:
@@ -121,7 +124,8 @@ def read_clauses(node: Node, part: Part, motors: Sequence[str]) -> Clause:
     """Return a <constraintList> as a clause: a condition on motor positions q, of which at least one row must hold.
 
     A row holds if a.q + b > 0 or, with the attribute `negate`, if a.q + b < 0. The attribute `q` of a row contains the names of motors of
-    the part, or their numbers within the part. `motors`: the names of all motors of the robot, in the order of q. Raises RobotFileError.
+    the part, or their numbers within the part. `motors`: the names of all motors of the robot, in the order of q. Raises RobotFileError if
+    the element is not valid.
     """
     rows, offsets = [], []
     for child in (child for child in node if child.tag == "constraint"):

@@ -47,7 +47,10 @@ class Node:
         return iter(self.children)
 
     def fail(self, what: str, problem: str, remedy: str) -> NoReturn:
-        """Raise RobotFileError for this element, with file and line; `what`: the faulty attribute or field."""
+        """Raise RobotFileError for this element, with file and line.
+
+        `what`: the faulty attribute or field. `problem`: what is wrong with it. `remedy`: what the user can do.
+        """
         raise RobotFileError(f"{self.file}:{self.line}: <{shown(self.tag)}> {what}: {problem}. {remedy}")
 
     def number(self, name: str, default: float | None = None) -> float:
@@ -86,7 +89,7 @@ class Node:
         return value
 
     def vector(self, names: tuple[str, str, str], default: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Array:
-        """Return three numbers (3,) from three attributes; `default` if all three are absent, 0 for a single one that is absent."""
+        """Return numbers (3,) from the three attributes `names`; `default` if all three are absent, 0 for a single one that is absent."""
         if not any(name in self.attributes for name in names):
             return np.array(default)
         return np.array([self.number(name, 0.0) for name in names])
@@ -150,7 +153,7 @@ class Node:
                 self.warn(f"unknown attribute {shown(name)!r} is ignored. {nearest(name, known)}Valid: {listed(known)}")
 
     def warn(self, problem: str, category: type[Warning] = UserWarning) -> None:
-        """Issue a warning about this element, with file, line and tag."""
+        """Issue a warning about this element: the text `problem` with file, line and tag."""
         tag = f"<{shown(self.tag)}>: " if self.tag else ""
         warnings.warn(f"{self.file}:{self.line}: {tag}{problem}", category, stacklevel=2)
 

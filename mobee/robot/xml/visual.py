@@ -28,7 +28,7 @@ NARROWEST, WIDEST = 1.0, 170.0  # degrees
 
 
 def read_visual(node: Node, draft: Draft, place: Place) -> None:
-    """Read a <visual>, which is a mesh file or a shape with its size in m, and add it to the draft; raises RobotFileError."""
+    """Read a <visual>, a mesh file or a shape with its size in m, and add it to the draft; raises RobotFileError if it is not valid."""
     rotation = read_rotation(node) if "rotation" in node.attributes else np.eye(3)
     link = place.link if node.flag("turns", default=True) else place.carrier
     kind: VisualKind = "mesh"
@@ -57,7 +57,7 @@ def _color(node: Node) -> Channels | None:
 
 
 def read_camera(node: Node, draft: Draft, place: Place) -> None:
-    """Read a <camera> and add it to the draft; raises RobotFileError.
+    """Read a <camera> and add it to the draft; raises RobotFileError if it is not valid.
 
     The camera has the rotation of the file; without a rotation it looks along its normal, with the picture upright at zero pose.
     """

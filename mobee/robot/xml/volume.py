@@ -46,7 +46,7 @@ class Volume:
 
 
 def read_volume(node: Node) -> Volume:
-    """Return the volume that a <sphere>, <capsule>, <cylinder> or <box> element describes; raises RobotFileError."""
+    """Return the volume that a <sphere>, <capsule>, <cylinder> or <box> element describes; raises RobotFileError if it is not valid."""
     centre = node.vector(PLACE)
     kind = KINDS[node.tag]
     if kind == "sphere":
@@ -67,7 +67,7 @@ def box_rotation(node: Node) -> Array:
 
 
 def height_along(axis: Array, angle: float) -> Array:
-    """Return the rotation (3, 3) of a box with its height (y axis) along the unit vector `axis` (3,), as computed by the program of 2014.
+    """Return the rotation (3, 3) of a box with its height (y axis) along the unit vector `axis` (3,), as MoBeE computed it in 2014.
 
     The box first turns about y by the angle between x and the projection of the axis onto the xz plane (0 to 180 deg). Then it turns about
     the common normal of y and the axis until its height is along the axis. Last it turns by `angle` [rad] about the axis. For an axis
@@ -111,7 +111,7 @@ def link_step(node: Node) -> tuple[Array, float]:
 
 
 def direction(node: Node, names: tuple[str, str, str], default: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Array:
-    """Return the unit vector (3,) along the vector in three attributes, or along `default` if all three are absent.
+    """Return the unit vector (3,) along the vector in the three attributes `names`, or along `default` if all three are absent.
 
     Raises RobotFileError if the vector is 0.
     """

@@ -52,7 +52,7 @@ def write_upgraded(source: Path, target: Path) -> list[Remark] | None:
     """Write the robot or world file `source` of an older version in today's form to `target`; return remarks for the user on the changes.
 
     Comments are left out, and files that `source` includes stay as they are. For a robot in today's form nothing is written, and None is
-    returned. Raises RobotFileError.
+    returned. Raises RobotFileError if the file is not valid.
     """
     root = read_xml(source, repair=True)
     if root.tag in WORLD_TAGS:

@@ -22,7 +22,7 @@ def identified_robots() -> tuple[str, ...]:
 
 
 def load_identified(robot_name: str, motors: Sequence[str] | None = None) -> dict[str, Any]:
-    """Return the identified parameters of a robot's motors, by the names of the arguments of `MotorParameters`.
+    """Return a dict from the names of arguments of `MotorParameters` to the identified values for a robot.
 
     They are lag [s], delay [s], backlash [rad] and friction [rad/s], each (n,), and encoder_noise [rad]. `motors`: names of the robot's
     motors, which give the order; None: the order of the file. Raises UnknownName for a robot that has not been identified, and InvalidValue

@@ -35,7 +35,7 @@ def detector_of(given: str | DetectorOf, things: Sequence[Thing]) -> Detector:
 
 
 def require_detector(given: str, things: Sequence[Thing]) -> None:
-    """Check the name or file of a detector without importing a module of the user.
+    """Check `given`, the name or file of a detector, without importing a module of the user.
 
     Raises the errors of `detector_of`: UnknownName, InvalidValue or NotInstalled.
     """

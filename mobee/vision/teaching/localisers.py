@@ -216,8 +216,8 @@ NAMES = (*REGRESSIONS, CORRECTED)
 def localiser(name: str, rig: Rig, seed: int) -> Localiser:
     """Return a new localiser by its name, one of NAMES: a regression of REGRESSIONS, or "corrected stereo".
 
-    `rig`: the robot and its cameras; a regression uses only the lens. Raises UnknownName for another name. The method `fit` of a regression
-    that needs scikit-learn raises NotInstalled without it.
+    `rig`: the robot and its cameras; a regression uses only the lens. `seed`: of the regression. Raises UnknownName for another name. The
+    method `fit` of a regression that needs scikit-learn raises NotInstalled without it.
     """
     if name == CORRECTED:
         return CorrectedStereo(rig)

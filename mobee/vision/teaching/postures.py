@@ -42,13 +42,15 @@ class Carried:
 
 
 def teacher_postures(rig: Rig, model: Model, carried: Carried, rest: Array, volume: tuple[Array, Array], count: int, seed: int) -> Array:
-    """Return postures (count, n) rad in which the teacher, the robot that carries the ball, holds it within a volume, without contacts.
+    """Return postures (count, n) rad in which the teacher, the robot that carries the ball, holds the ball within a volume.
+
+    A posture has the positions of all n motors of both robots; in no posture are solids in contact.
 
     Args:
         rig: both robots as one model, with the cameras.
         model: the robots in their world, for the contacts.
         carried: the ball.
-        rest: (n,) rad, positions of all motors that do not move the ball.
+        rest: (n,) rad, one posture of all motors: those that do not move the ball stay there; the values of the others are not used.
         volume: the lowest and the highest corner of the volume, (3,) m each, root frame.
         count: number of postures.
         seed: seed of the random draws.
@@ -86,7 +88,7 @@ def gaze_postures(
         rig: both robots as one model, with the cameras.
         model: the robots in their world, for the contacts.
         carried: the ball.
-        posture: (n,) rad, positions of all other motors.
+        posture: (n,) rad, one posture of all motors: those other than torso and head stay there; the values of torso and head are not used.
         share: share of the torso's range, about its home, in which the torso is drawn.
         size: width and height of a picture, px.
         count: largest number of postures.

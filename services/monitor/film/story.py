@@ -100,7 +100,10 @@ def _surprise(last: dict[str, Any]) -> str:
 
 
 def heading(ink: Any, name: str, moment: float, fonts: Fonts) -> None:
-    """Write the title of the film with the robot's `name`, and the robot's time `moment` [s since the begin of the run]."""
+    """Write the title of the film with the robot's `name`, and the robot's time `moment` [s since the begin of the run].
+
+    `ink`: drawing context of Pillow.
+    """
     ink.text((12, 8), f"MoBeE: {name}", font=fonts.title, fill=TEXT)
     minutes, seconds = divmod(round(moment), 60)
     if minutes >= 60:
@@ -111,7 +114,10 @@ def heading(ink: Any, name: str, moment: float, fonts: Fonts) -> None:
 
 
 def remarks(ink: Any, below: int, fonts: Fonts) -> None:
-    """Write the text that explains the marks beside the robot; `below`: y of the last row of pixels."""
+    """Write the text that explains the marks beside the robot; `below`: y of the last row of pixels.
+
+    `ink`: drawing context of Pillow.
+    """
     top, long = below - 14 * len(REMARKS) - 10, max(fonts.small.getlength(text) for text in REMARKS)
     ink.rounded_rectangle((6, top, 18 + long, below - 4), 5, fill=GROUND)
     for row, text in enumerate(REMARKS):

@@ -63,10 +63,12 @@ def outcomes_of(learned: Learned, known: Knowledge, space: Space) -> Outcomes:
 
 
 def baselines(outcomes: Outcomes, exists: NDArray[np.bool_], start: int, transitions: int) -> dict[str, Curve]:
-    """Simulate the explorers BASELINES (least_tried and random) and return the learning curve of each, by name.
+    """Simulate two explorers, "least_tried" and "random", and return the learning curve of each, by name.
 
-    `exists`: (S, A), True where the state has the action. `start`: state in which every simulation begins. `transitions`: length of the
-    simulation, at most LONGEST (10 000). Each curve is the mean of 4 simulations.
+    A learning curve is a list of points (number of transitions, share of the state-actions that were tried, share that are predictable), as
+    in `Curve`; it is the mean of 4 simulations. `outcomes`: the possible outcomes of all state-actions, with their probabilities. `exists`:
+    (S, A), True where the state has the action. `start`: state in which every simulation begins. `transitions`: length of a simulation;
+    above LONGEST (10 000) it is LONGEST.
     """
     transitions = min(transitions, LONGEST)
     rng = np.random.default_rng(SEED)

@@ -137,8 +137,8 @@ def _key_of(folder: Path | None) -> str:
 def serve(site: Site, bind: str, port: int) -> PageServer:
     """Serve a page at an address and port, and return its server.
 
-    If the port is in use, the call tries again for 1 s, because a program that has just ended may still occupy it; then it exits with code
-    2 and one line on standard error.
+    `bind`: address of the network interface, as "127.0.0.1". If the port is in use, the call tries again for 1 s, because a program that
+    has just ended may still occupy it; then it exits with code 2 and one line on standard error.
     """
     give_up = time.monotonic() + 1.0
     while True:

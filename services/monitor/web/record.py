@@ -32,7 +32,7 @@ class Record:
     """The file of the recorded values, to which lines are appended, up to 500 MB. Any thread may write."""
 
     def __init__(self, path: Path, now: Callable[[], float]) -> None:
-        """Open the file; `now`: returns the robot's time [s]."""
+        """Open the file `path` of the recorded values; `now`: returns the robot's time [s]."""
         self._file = path.open("a", encoding="utf-8", buffering=1 << 16)
         self._next: dict[str, float] = {}  # s, by name
         self._now, self._lock, self._size = now, Lock(), path.stat().st_size
@@ -60,7 +60,7 @@ class Record:
                 self._file.flush()
 
     def close(self) -> None:
-        """Close the file; later values are not recorded."""
+        """Close the file of the recorded values; later values are not recorded."""
         with self._lock:
             self._file.close()
 

@@ -79,7 +79,7 @@ class Pages:
     lock: threading.Lock = field(default_factory=threading.Lock)
 
     def note(self, page: str, shown: int, late: dict[str, float]) -> None:
-        """Record a request of a page: the version of the board that it has shown, and its delays [s of robot time], by name."""
+        """Record a request of a page: the version of the board that it has shown, and its delays `late` [s of robot time], by name."""
         with self.lock:
             self.seen[page], self.shown[page], self.late[page] = time.monotonic(), shown, late
 

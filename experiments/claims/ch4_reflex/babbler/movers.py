@@ -25,7 +25,7 @@ _M = TypeVar("_M", bound=Message)
 
 
 class PartStreams(Generic[_M]):
-    """The newest message of one class from each part; in lockstep that of the current tick.
+    """The newest message of one class from each part; in lockstep (every tick waits for all participants) that of the current tick.
 
     `newest`: the messages, by part.  `cls`: the class of message.  A new run removes all messages.
     """
@@ -51,7 +51,7 @@ class PartStreams(Generic[_M]):
 class AtDrives:
     """Sends position commands to the drives of all parts in every tick, along minimum-jerk moves from posture to posture.
 
-    If the safety layer ends a move, all parts are armed again, and the next move begins where the robot is.
+    If the safety layer ends a move, all parts are armed (released to follow commands) again, and the next move begins where the robot is.
     """
 
     def __init__(self, service: Service, robot: Robot, targets: Targets, speed: float, note: Callable[[Commanded], None]) -> None:

@@ -217,7 +217,10 @@ def _present(hand: Hand, mover: Mover | None, problem: Problem) -> Callable[[], 
 
 
 def planned(hand: Hand, seed: int, problem: Problem) -> Ended:
-    """Let the planner attempt a problem: inverse kinematics and RRT-Connect, replanned after every unexpected outcome."""
+    """Let the planner attempt a problem: inverse kinematics and RRT-Connect, replanned after every unexpected outcome.
+
+    `seed`: of the planner.
+    """
     plant = PeerPlant(hand, 1.0 / RATE)
     peer = PlannerPeer(plant, belief(), PART, "none", seed + problem.number)
     made = peer.try_problem(problem.target)

@@ -46,7 +46,7 @@ class Hand(BusPlant):
     def tick(self) -> int:
         """The current tick: the newer one of the tick of the bus and that of the part's last motion message.
 
-        In lockstep only messages of this part arrive.
+        In lockstep (every tick waits for all participants) only messages of this part arrive.
         """
         motion = self._motion.get(PART)
         return self._link.bus.k if motion is None else max(self._link.bus.k, motion.k)

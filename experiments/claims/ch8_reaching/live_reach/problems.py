@@ -72,7 +72,7 @@ def space() -> Lattice:
 def offline_plant(seed: int) -> OfflinePlant:
     """Return an offline plant of the right arm with its wrist (seven motors) at the table.
 
-    The motor parameters are those that were identified on PyBullet's robot.
+    `seed`: of the plant.  The motor parameters are those that were identified on PyBullet's robot.
     """
     motors = MotorParameters.identified(ROBOT)
     return OfflinePlant(Model(robot(), world()), seed, Gains.named(GAINS), motors, 1.0 / RATE, active=robot().parts[PART].motors[:WRIST])
@@ -124,7 +124,10 @@ def touchable(known: PeerBelief, target: ReachTarget) -> bool:
 
 
 def grid_problems(seed: int) -> list[Problem]:
-    """Return a problem for each of the thesis' 27 targets, with a random first pose each; some cannot be reached."""
+    """Return a problem for each of the thesis' 27 targets, with a random first pose each; some cannot be reached.
+
+    `seed`: of the draw.
+    """
     rng, known = np.random.default_rng([seed, 271]), belief()
     return [_begun(known, GRID, number, target, rng) for number, target in enumerate(grid_targets())]
 
@@ -132,7 +135,7 @@ def grid_problems(seed: int) -> list[Problem]:
 def fresh_problems(seed: int, count: int) -> list[Problem]:
     """Return `count` problems with new targets, drawn in the box around the 27 targets, that can be reached.
 
-    Raises InvalidValue if 1000 draws are not enough.
+    `seed`: of the draw.  Raises InvalidValue if 1000 draws are not enough.
     """
     rng, known, places = np.random.default_rng([seed, 50]), belief(), grid()
     found: list[Problem] = []
@@ -148,7 +151,7 @@ def fresh_problems(seed: int, count: int) -> list[Problem]:
 def moving_problems(seed: int, count: int) -> list[Problem]:
     """Return `count` problems with a new target that moves, and `count` with an obstacle that crosses the path of the hand.
 
-    There are fewer if too few of the drawn targets allow such a motion.
+    There are fewer if too few of the drawn targets allow such a motion.  `seed`: of the draw.
     """
     rng, known, found = np.random.default_rng([seed, 51]), belief(), list[Problem]()
     for problem in fresh_problems(seed + 1000, SPARE * count):
@@ -213,7 +216,7 @@ def posture(known: PeerBelief, q: Array) -> Array:
 def train(file: Path, seed: int, transitions: int, tries: int) -> None:
     """Learn transitions, and then to reach for the 27 targets, on the offline plant; everything is recorded in `file`.
 
-    `transitions`, `tries`: numbers to be reached in all, so that an interrupted call can be repeated.
+    `seed`: of agent and plant.  `transitions`, `tries`: numbers to be reached in all, so that an interrupted call can be repeated.
     """
     plant = offline_plant(seed)
     with TransitionStore(file, PART) as store:
@@ -224,7 +227,10 @@ def train(file: Path, seed: int, transitions: int, tries: int) -> None:
 
 
 def learner(plant: ReachPlant, seed: int, file: Path) -> ReachAgent:
-    """Return the reach learner that continues the record in `file`, or begins it; `file` has the learned transitions."""
+    """Return the reach learner that continues the record in `file`, or begins it; `file` has the learned transitions.
+
+    `seed`: of the learner.
+    """
     known = load_learned(file, PART, plant.robot)
     store = ReachStore(file, PART)
     return LEARNERS[LEARNER].agent(known.space, plant, known.model.debiased(), marker=MARKER, seed=seed, store=store)

@@ -51,7 +51,7 @@ class Network:
     def require(self, things: Sequence[Thing], path: str) -> None:
         """Raise InvalidValue unless the network was trained for exactly these things: names, kinds, sizes and colours.
 
-        `path`: the file, for the message.
+        `path`: the file of the network, for the message.
         """
         own, given = {_looks(one) for one in self.things}, {_looks(one) for one in things}
         if own != given:

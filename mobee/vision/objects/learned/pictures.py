@@ -43,8 +43,8 @@ class Labelled:
 def labelled_pictures(robot: Robot, world: World, things: Sequence[Thing], count: int, seed: int) -> Iterator[Labelled]:
     """Yield `count` pictures of imperfect cameras with random postures, positions of the things, rooms, clutter and brightness.
 
-    A quarter of the objects in the room, and of the paper on the world's boxes, has the colours of the things. Raises InvalidValue if the
-    robot has no camera.
+    A quarter of the objects in the room, and of the paper on the world's boxes, has the colours of the things. `seed`: of everything
+    random. Raises InvalidValue if the robot has no camera.
     """
     cameras = cameras_of(robot)
     if not cameras:
