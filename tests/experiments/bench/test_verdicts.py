@@ -61,7 +61,7 @@ def test_every_requirement_of_a_benchmark_is_judged_by_itself(name: str) -> None
 @pytest.mark.parametrize("name", [name for name, required in REQUIREMENTS.items() if required])
 def test_times_sizes_and_errors_have_an_upper_bound_and_rates_and_shares_a_lower_one(name: str) -> None:
     for one in REQUIREMENTS[name]:
-        has_upper = re.search(r", (s|ms|us|MB)\b|, s on|NumPy's import|largest|errors|evaluations", one.name) is not None
+        has_upper = re.search(r", (s|ms|us|MiB)\b|, s on|NumPy's import|largest|errors|evaluations", one.name) is not None
         assert ((one.at_most is not None), (one.at_least is not None)) == (has_upper, not has_upper), one.name
 
 

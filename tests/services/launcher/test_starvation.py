@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+import psutil
 import pytest
 
 from services.launcher.starvation import PERIOD, Starvation
@@ -82,7 +83,9 @@ def test_waits_of_processes_one_after_the_other_add_up() -> None:
 
 def test_a_stopped_process_is_not_starved(spinning: subprocess.Popen[bytes]) -> None:
     spinning.send_signal(signal.SIGSTOP)
-    time.sleep(0.1)
+    give_up = time.monotonic() + 30.0
+    while psutil.Process(spinning.pid).status() != psutil.STATUS_STOPPED and time.monotonic() < give_up:
+        time.sleep(0.01)  # it stops when it gets a processor
     assert measured(spinning.pid) == pytest.approx(0.0, abs=0.1)
 
 
