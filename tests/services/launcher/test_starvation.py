@@ -6,7 +6,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import psutil
@@ -39,6 +39,12 @@ def measured(*pids: int) -> float:
     return starvation.total / (now - begin)
 
 
+def until(condition: Callable[[], bool]) -> None:
+    give_up = time.monotonic() + 30.0
+    while not condition() and time.monotonic() < give_up:
+        time.sleep(0.01)
+
+
 @contextmanager
 def busy_processor() -> Iterator[None]:
     """Three other programs that want the processor."""
@@ -46,7 +52,8 @@ def busy_processor() -> Iterator[None]:
     for other in others:
         os.sched_setaffinity(other.pid, {min(os.sched_getaffinity(0))})
     try:
-        time.sleep(0.3)
+        for other in others:
+            until(lambda other=other: psutil.Process(other.pid).cpu_times().user > 0.1)  # it has started, and wants the processor
         yield
     finally:
         for other in others:
@@ -83,9 +90,7 @@ def test_waits_of_processes_one_after_the_other_add_up() -> None:
 
 def test_a_stopped_process_is_not_starved(spinning: subprocess.Popen[bytes]) -> None:
     spinning.send_signal(signal.SIGSTOP)
-    give_up = time.monotonic() + 30.0
-    while psutil.Process(spinning.pid).status() != psutil.STATUS_STOPPED and time.monotonic() < give_up:
-        time.sleep(0.01)  # it stops when it gets a processor
+    until(lambda: psutil.Process(spinning.pid).status() == psutil.STATUS_STOPPED)  # when it gets a processor
     assert measured(spinning.pid) == pytest.approx(0.0, abs=0.1)
 
 
