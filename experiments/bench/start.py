@@ -133,15 +133,17 @@ def _system(seconds: float, speeds: Calibration) -> dict[str, Any]:
 def mebibytes(launcher: int) -> dict[str, float]:
     """Return a dict from the name of a launcher and of each service it has started to its memory [MiB].
 
-    `launcher`: process id.  The memory is the PSS: memory that n processes share counts 1/n for each.  A process that has ended is absent.
+    `launcher`: process id.  The memory is the PSS: memory that n processes share counts 1/n for each.  That of a service includes its standby
+    process, which starts 10 s after the service is ready.  A process that has ended is absent.
     """
-    found = {}
+    found: dict[str, float] = {}
     for pid in (launcher, *_children(launcher)):
         with contextlib.suppress(OSError, StopIteration):  # the process has ended meanwhile
             words = Path(f"/proc/{pid}/cmdline").read_bytes().decode().split("\0")
             lines = Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()
             kibibytes = next(int(line.split()[1]) for line in lines if line.startswith("Pss:"))
-            found["launcher" if pid == launcher else _service_name(words)] = kibibytes / 1024.0
+            name = "launcher" if pid == launcher else _service_name(words)
+            found[name] = found.get(name, 0.0) + kibibytes / 1024.0
     return found
 
 

@@ -8,175 +8,22 @@ import uuid
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from bus_schema import keys
-from bus_schema.messages import Clock, EStop, Geometry, Motion, Reach, Tick, Turn
-from bus_schema.rpc import AddObject, Done, Empty, Goal, ObjectState, OneName, ReachFor, Request, Started, Take, Taken, WithEpoch, World
+from bus_schema.messages import Clock, EStop, Motion, Tick, Turn
+from bus_schema.rpc import Done, Goal, ObjectState, ReachFor, Request, Started, Take, Taken, WithEpoch
 from mobee.arrays import Array
-from mobee.errors import ActionInterrupted, InvalidValue, MobeeError, UnknownName
+from mobee.errors import ActionInterrupted, InvalidValue, MobeeError
 from mobee.plant import Outcome
-from mobee.reach import TARGET, Aim, ReachOutcome, ReachTarget
+from mobee.reach import Aim, ReachOutcome, ReachTarget
 from mobee.robot.robot import Robot
 from services.common.lockstep import Participant
+from services.common.reach_client import TRIES, ReachClient
 from services.common.rpc import CallFailed
 from services.common.service import Service
-
-TRIES = 3  # of a call, each of half a second: the caller must know whether the call had its effect
-UPRIGHT = [1.0, 0.0, 0.0, 0.0]
-
-
-class ReachClient:
-    """The client's side of reaches: presents a target to the model, and keeps the newest `Reach` message of each part."""
-
-    def __init__(self, service: Service, parts: tuple[str, ...]) -> None:
-        self._service = service
-        self._target: ReachTarget | None = None
-        self._object = TARGET
-        self._is_there = False  # in the world of the model that runs now
-        self._reaches: dict[str, Reach] = {}
-        for part in parts:
-            service.on_newest(Reach, partial(self._note_reach, part), part)
-        service.on_alive(self._note_alive)
-
-    def present(self, target: ReachTarget | None) -> None:
-        """Put a target into the model's world as the object `reach_target`, or move it there; None removes it.
-
-        Implements `mobee.reach.ReachPlant.present`. Raises ActionInterrupted if the model does not answer, InvalidValue if it refuses the
-        target.
-        """
-        if target is not None:
-            self._put(target)
-        elif self._is_there:
-            with suppress(InvalidValue):  # another client has removed it already
-                self._call("remove", OneName, name=TARGET)
-        self._target, self._object, self._is_there = target, TARGET, target is not None
-
-    def present_object(self, name: str, aim: Aim = "centre", normal: Array | None = None, faces: bool = False) -> ReachTarget:
-        """Use the object `name` of the model's world as target, also while it moves; return the target at its present position.
-
-        `aim`: the marker has to reach the "centre" or the "surface" of the target. `normal`: desired direction (3,) of the marker's normal,
-        root frame; None: any. `faces`: True: the normal has to point at the target. Raises UnknownName if there is no such object;
-        InvalidValue if the object is stale, that is, not seen any more, or if its role is not target, because it then repels hands;
-        ActionInterrupted if the model does not answer.
-        """
-        found = self._known(name)
-        if found.role != "target":
-            raise InvalidValue(
-                f"{name!r} has the role {found.role} in the model's world, and hands reach only for the role target: change the role "
-                f"by {keys.world_rpc('role')}, or reach for a free position."
-            )
-        self.present(None)
-        radius = _inner_radius(found.geometry) - found.margin
-        self._target, self._object = ReachTarget(np.array(found.position), radius, aim, normal, faces), name
-        return self._target
-
-    def asked(self) -> dict[str, object]:
-        """Return the fields of a `ReachFor` request that describe the presented target; raises InvalidValue if none is presented.
-
-        If the model was started again, the target is put into its world again.
-        """
-        target = self._target
-        if target is None:
-            raise InvalidValue("no target is presented: call present(ReachTarget(position)) first")
-        if self._object == TARGET and not self._is_there:  # the model was started again
-            self._put(target)
-            self._is_there = True
-        return {
-            "object": self._object,
-            "position": target.position.tolist(),
-            "radius": target.radius,
-            "aim": target.aim,
-            "normal": None if target.normal is None else target.normal.tolist(),
-            "faces": target.faces,
-        }
-
-    def has_ended(self, part: str, action_id: str) -> bool:
-        """Return whether the controller has reported that the force of the reach `action_id` of a part has ended."""
-        reach = self._reaches.get(part)
-        return reach is not None and reach.action_id == action_id and reach.phase != "reaching"
-
-    def outcome(self, part: str, motion: Motion, after: Outcome, tick: float) -> ReachOutcome:
-        """Return the outcome of a part's reach that has ended; raises ActionInterrupted if the reach was interrupted.
-
-        `motion`: the last `Motion` message of the part. `after`: outcome of the second phase, in which the attractor pulls the part back,
-        with the duration of both phases. `tick`: length of a tick, s.
-        """
-        reach = self._reaches[part]
-        if reach.phase == "interrupted":
-            raise ActionInterrupted(f"{part}: the reach was interrupted")
-        back = motion.since_k - reach.end_k
-        return ReachOutcome(
-            marker=np.array(reach.position),
-            q=np.array(reach.q),
-            missing=reach.missing,
-            settled=reach.settled,
-            duration=after.duration,
-            touched=tuple(reach.touched),
-            after=Outcome(after.q, after.settled, back * tick, after.touched) if back else after,
-        )
-
-    def leave(self) -> None:
-        """Remove the target from the model's world, if there is one; it is no error if the model has already ended."""
-        try:
-            self.present(None)
-        except ActionInterrupted as error:
-            self._service.log.info("the target could not be removed: %s", error)
-
-    def _put(self, target: ReachTarget) -> None:
-        sphere = Geometry(kind="sphere", size=[target.radius])
-        self._call("add", AddObject, name=TARGET, geometry=sphere, position=target.position.tolist(), quaternion=UPRIGHT, role="target")
-
-    def objects(self) -> dict[str, ObjectState]:
-        """Return the objects of the model's world that are not attached to a link, by name.
-
-        Raises ActionInterrupted if the model does not answer.
-        """
-        return {one.name: one for one in self._listed().objects if not one.link}
-
-    def _listed(self) -> World:
-        try:
-            return self._service.call(keys.world_rpc("list"), Empty, World, tries=TRIES)
-        except CallFailed as error:
-            raise ActionInterrupted(f"the model does not list its objects: {error}") from None
-
-    def _known(self, name: str) -> ObjectState:
-        world = self._listed()
-        objects = {one.name: one for one in world.objects}
-        if name in world.stale:
-            raise InvalidValue(
-                f"{name!r} is stale: the newest picture that shows it is {world.stale[name]:.1f} s old, and it may be elsewhere. "
-                "`mobee status` shows what vision sees; reach for it when it is seen again, or for a place with --target."
-            )
-        if name not in objects:
-            raise UnknownName("object of the model's world", name, objects)
-        return objects[name]
-
-    def _call(self, verb: str, request: type[AddObject] | type[OneName], **fields: Any) -> None:
-        try:
-            self._service.call(keys.world_rpc(verb), request, Done, tries=TRIES, **fields)
-        except CallFailed as error:
-            if error.code == "no_answer":
-                raise ActionInterrupted(f"the model does not answer: {error}") from None
-            raise InvalidValue(str(error)) from None
-
-    def _note_reach(self, part: str, reach: Reach) -> None:
-        self._reaches[part] = reach
-
-    def _note_alive(self, who: str, instance: str, up: bool) -> None:
-        if who == "model":
-            self._is_there = False
-
-
-def _inner_radius(shape: Geometry) -> float:
-    """Return the radius [m] of the largest sphere about the centre that fits into the shape."""
-    if shape.kind == "box":
-        return 0.5 * min(shape.size)
-    return min(shape.size[0], 0.5 * shape.size[1]) if shape.kind == "cylinder" else shape.size[0]
-
 
 RETRY_PERIOD = 0.2  # s between attempts while there is no controller or the part is in hold
 OWNED_PATIENCE = 3.0  # s for which a goal may belong to another service: the token of one that ended lasts up to a second
@@ -229,7 +76,7 @@ class BusPlant:
         else:
             service.on_clock(self._note_clock)
         service.on_run(self._new_run)
-        service.on_newest(EStop, self._note_stop)
+        service.on_newest(EStop, self._note_stop, any_run=True)
         self._reaches = ReachClient(service, parts)
 
     @property

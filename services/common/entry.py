@@ -14,25 +14,25 @@ from mobee.errors import InvalidValue, MobeeError, RobotFileError, UnknownName
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
 from services.common.config import ServiceConfig
-from services.common.exit_codes import BAD_INPUT, FAILED
+from services.common.exit_codes import BAD_INPUT, FAILED, OK
 from services.common.session import BusUnreachable
 from services.common.text import printable
 
 HELD = "MOBEE_HELD"
 """Environment variable of a process that a launcher has started. It holds the instance of the router that the process may join and, if the
-launcher has joined from another host, the process id of the launcher. The launcher closes the standard input of the process when it may
-join."""
+launcher has joined from another host, the process id of the launcher. The launcher writes a byte to the standard input of the process when
+it may join."""
 
 
 def wait_until_released() -> tuple[str, ...]:
     """Wait until the services on which this one depends are ready, if a launcher has started it.
 
     Returns the words of the environment variable MOBEE_HELD: the instance of the router and, if the launcher has joined from another host,
-    the launcher's process id; () without a launcher.
+    the launcher's process id; () without a launcher. Raises SystemExit if the launcher ends before.
     """
     held = os.environ.pop(HELD, "").split()
-    if held:
-        os.read(sys.stdin.fileno(), 1)  # returns at the end of the file, also when the launcher has died
+    if held and not os.read(sys.stdin.fileno(), 1):
+        raise SystemExit(OK)  # otherwise it would join beside the process that it should replace
     return tuple(held)
 
 

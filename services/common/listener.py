@@ -43,14 +43,14 @@ class Listener:
         self._on_run: list[Callable[[], None]] = []
         self._early: list[Callable[[], None]] = []  # handlers of past messages that came before the first clock message
 
-    def on_newest(self, cls: type[_M], handler: Callable[[_M], None], name: str = "*") -> None:
+    def on_newest(self, cls: type[_M], handler: Callable[[_M], None], name: str = "*", *, any_run: bool = False) -> None:
         """Call `handler` with the newest message of a stream; a message that still waits is replaced by a newer one.
 
         A participant in lockstep handles every message instead. `name`: the variable in the message's key, such as the part; by default
-        any.
+        any. `any_run`: also a message of another run of robot_sim.
         """
         part = part_of(cls, name)
-        self._subscribe(cls.stream.keys(name), self._newest(lambda sample: self._deliver(cls, sample, handler, part)))
+        self._subscribe(cls.stream.keys(name), self._newest(lambda sample: self._deliver(cls, sample, handler, part, any_run)))
 
     def on_each(
         self,

@@ -35,6 +35,14 @@ class Entry:
     needs: Mapping[str, str] = field(default_factory=dict)
     given: Mapping[str, str] = field(default_factory=dict)
 
+    @property
+    def has_standby(self) -> bool:
+        """Whether a standby process may wait beside the service: it is vital, and its program is not a user's.
+
+        Two processes of a user's program could open the same hardware.
+        """
+        return self.vital and self.module.startswith("services.")
+
 
 _NICE_PICTURES = 10  # niceness of services that may be late
 _NICE_PLANS = 9  # of agents: after the control chain, before pictures

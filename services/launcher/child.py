@@ -9,6 +9,7 @@ import subprocess
 import time
 from collections import deque
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, Protocol
@@ -66,7 +67,8 @@ class Program:
 
     `who`: name of the service. `argv`: command. `log`: file of its standard output and error. `stage`: place in the order of the services;
     the last stage is stopped first. `after`: services that must be ready before it joins the system. `nice`: niceness of its process.
-    `vital`: whether the robot is stopped if the launcher gives the service up. `may_end`: whether it may end by itself without a failure.
+    `vital`: whether the robot is stopped if the launcher gives the service up. `standby`: whether a second process of it may wait, in order
+    to replace the first. `may_end`: whether it may end by itself without a failure.
     `patience`: least time without an answer [s] after which it may count as frozen. `environment`: variables that are added to the
     launcher's own.
     """
@@ -78,6 +80,7 @@ class Program:
     after: tuple[str, ...] = ()
     nice: int = 0
     vital: bool = True
+    standby: bool = False
     may_end: bool = False  # by itself, with code 0
     patience: float = 0.0
     environment: Mapping[str, str] = field(default_factory=dict)
@@ -210,9 +213,13 @@ class Child:
         return now - max(self.answered_at, self.advanced_at) - (0.0 if self.starvation is None else self.starvation.total)
 
     def release(self) -> None:
-        """Let the service join the system, by closing its standard input."""
+        """Let the service join the system, by a byte on its standard input."""
         assert self.process is not None and self.process.stdin is not None
-        self.process.stdin.close()
+        with suppress(BrokenPipeError):  # the process has ended; the next check finds this
+            self.process.stdin.write(b"\n")
+            self.process.stdin.flush()
+        with suppress(BrokenPipeError):
+            self.process.stdin.close()
         self.enter("starting")
 
     def exit_code(self) -> int | None:

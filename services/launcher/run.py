@@ -444,6 +444,7 @@ def _programs(here: Scenario, directory: Path, bus: Connection) -> list[Program]
             after=part.entry.after,
             nice=part.entry.nice,
             vital=part.entry.vital,
+            standby=part.entry.has_standby,
             may_end=part.entry.may_end,
             patience=part.config.patience if here.is_locked else patience,
             environment={

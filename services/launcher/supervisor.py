@@ -25,7 +25,7 @@ NICE_SERVICE = 10  # niceness from which the longer time applies
 READY_TIMEOUT = 60.0  # s from its start until a service is ready
 FIRST_WAIT, LONGEST_WAIT = 0.2, 5.0  # s before the second restart and later ones, doubled with every failure; the first is immediate
 MAX_RESTARTS, RESTART_WINDOW = 5, 60.0  # restarts within so many s; then a service is given up
-STANDBY_DELAY = 10.0  # s for which a vital service is ready before its standby process starts: many runs end before
+STANDBY_DELAY = 10.0  # s for which a service is ready before its standby process starts: many runs end before
 STANDBY_PERIOD = 1.0  # s between two starts of standby processes, each of which needs a processor for 0.5 to 1 s
 END_TIMEOUT = 2.0  # s from SIGTERM to SIGKILL
 
@@ -161,7 +161,7 @@ class Supervisor:
     def _check_standby(self, child: Child, now: float) -> None:
         """Start a standby process of a vital service, so that a restart does not wait for the imports; one at a time."""
         is_due = child.phase == "ready" and now - child.since >= STANDBY_DELAY and now >= self._next_standby
-        if child.program.vital and is_due and not child.has_prepared:
+        if child.program.standby and is_due and not child.has_prepared:
             self._next_standby = now + STANDBY_PERIOD
             try:
                 child.prepare(self._held)

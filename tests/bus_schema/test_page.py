@@ -19,6 +19,7 @@ from bus_schema.stream import EVERYONE
 ROOT = Path(__file__).parents[2]
 SHARED = {
     "bus_plant.py": "agent",
+    "reach_client.py": "agent",
     "behaviour.py": "behaviour",
     "followed_part.py": "behaviour",
 }  # files of services/common that one service uses

@@ -168,7 +168,7 @@ def test_an_action_does_not_continue_with_a_new_controller_after(stage: Stage, c
     before = under_way(stage)
     if cause == "emergency stop":
         stage.rig.bus.publisher(EStop).put(set=True, source="test", reason="a test")
-        time.sleep(0.5)
+        stage.rig.stat("agent_torso")  # is answered after the stop was handled
     stage.controller.restart()
     stage.controller.lasts = 5
     if cause == "long hold":

@@ -38,6 +38,20 @@ def test_a_service_that_was_started_early_waits_until_it_is_released(tmp_path: P
         child.kill()
 
 
+def test_a_service_that_waits_ends_with_its_launcher(tmp_path: Path) -> None:
+    """It must not join: on a joined host, the service that it should replace and the router still run."""
+    log = tmp_path / "one.log"
+    child = Child(Program("one", (sys.executable, "-c", PROGRAM), log))
+    child.prepare("i1_router 1234")
+    try:
+        assert child.standby is not None and child.standby.stdin is not None
+        child.standby.stdin.close()  # as the operating system does when the launcher dies
+        assert child.standby.wait(LIMIT) == 0
+        assert log.read_text() == "imported\n"
+    finally:
+        child.dismiss()
+
+
 def test_a_service_that_is_started_by_hand_does_not_wait() -> None:
     environment = {name: value for name, value in os.environ.items() if name != HELD}
     with subprocess.Popen(

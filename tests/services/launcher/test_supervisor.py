@@ -13,6 +13,7 @@ from typing import Any, cast
 import pytest
 
 from services.common.service import Service
+from services.launcher.catalogue import entry_of
 from services.launcher.child import Child, Program
 from services.launcher.supervisor import FROZEN_TIME, FROZEN_TIME_NICE, STANDBY_DELAY, STANDBY_PERIOD, Supervisor
 
@@ -52,11 +53,11 @@ def test_what_yields_to_others_may_be_silent_for_longer(nice: int, limit: float)
     assert supervisor._is_frozen(child, child.answered_at + limit)
 
 
-def test_a_vital_service_that_is_ready_for_long_has_a_standby_process(tmp_path: Path) -> None:
+def test_a_service_that_is_ready_for_long_has_a_standby_process(tmp_path: Path) -> None:
     supervisor = Supervisor(cast("Service", Silent()), [], cast("Any", None), lambda text: None)
     children = [
-        Child(Program(who, ("sleep", "60"), tmp_path / f"{who}.log", vital=vital), phase="ready", since=100.0)
-        for who, vital in (("model", True), ("monitor", False), ("controller", True))
+        Child(Program(who, ("sleep", "60"), tmp_path / f"{who}.log", standby=standby), phase="ready", since=100.0)
+        for who, standby in (("model", True), ("monitor", False), ("controller", True))
     ]
     prepared = []
     try:
@@ -68,6 +69,15 @@ def test_a_vital_service_that_is_ready_for_long_has_a_standby_process(tmp_path: 
     finally:
         for child in children:
             child.dismiss()
+
+
+def test_a_vital_service_has_a_standby_process_unless_its_program_is_a_users() -> None:
+    entries = {(who, module): entry_of(who, module) for who, module in (("robot_sim", None), ("vision", None), ("robot_sim", "my_arm"))}
+    assert {key: entry is not None and entry.has_standby for key, entry in entries.items()} == {
+        ("robot_sim", None): True,
+        ("vision", None): False,
+        ("robot_sim", "my_arm"): False,
+    }
 
 
 def test_the_standby_process_takes_the_place_of_one_that_failed(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from bus_schema.messages import Geometry
 from bus_schema.rpc import Done, ObjectState, World
 from mobee import ActionInterrupted, InvalidValue, ReachTarget, UnknownName
 from mobee.reach import TARGET
-from services.common.bus_plant import ReachClient
+from services.common.reach_client import ReachClient
 from services.common.rpc import CallFailed
 
 UPRIGHT = [1.0, 0.0, 0.0, 0.0]
