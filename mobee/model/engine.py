@@ -72,7 +72,10 @@ class Engine:
         self._rooms: list[_Room] = []  # buffers that no evaluation uses now
 
     def transforms(self, q: Array) -> Array:
-        """Return the transform of every link in the poses q (B, n) rad, (B, L, 4, 4): from its place at zero pose, in the root frame."""
+        """Return the transforms (B, L, 4, 4) of the L links of the robot in the poses q (B, n) rad, in the root frame [m].
+
+        The transform of a link maps a point of the link from its position at zero pose to its position in the pose.
+        """
         return core.link_poses(self._bare, q, len(self.robot.links))
 
     def jacobians(self, q: Array, link: int, point: Array) -> Array:

@@ -34,7 +34,10 @@ class Engine(Protocol):
     """An engine that evaluates poses: the compiled one, or python-fcl as its independent reference."""
 
     def transforms(self, q: Array) -> Array:
-        """Return the transform of every link in the poses q (B, n) rad, (B, L, 4, 4): from its place at zero pose, in the root frame."""
+        """Return the transforms (B, L, 4, 4) of the L links of the robot in the poses q (B, n) rad, in the root frame [m].
+
+        The transform of a link maps a point of the link from its position at zero pose to its position in the pose.
+        """
 
     def jacobians(self, q: Array, link: int, point: Array) -> Array:
         """Return the Jacobians (B, 6, n) of a point that is fixed to a link, in the poses q (B, n) rad: linear rows, then angular.

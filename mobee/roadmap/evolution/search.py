@@ -85,7 +85,7 @@ EVALUATIONS = 100_000
 
 @dataclass(frozen=True, slots=True)
 class Restart:
-    """The condition under which a search restarts; it restarts alternately at a random point of the box and at its first start.
+    """When a search restarts, with two conditions. Restarts begin in turn at a random point of the box and at the search's first start.
 
     `std`: restart if the largest standard deviation is below this fraction of the box. `patience`, `gain`: restart if `patience`
     generations have not lowered the best cost by the fraction `gain`.
