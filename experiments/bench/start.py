@@ -133,8 +133,9 @@ def _system(seconds: float, speeds: Calibration) -> dict[str, Any]:
 def mebibytes(launcher: int) -> dict[str, float]:
     """Return a dict from the name of a launcher and of each service it has started to its memory [MiB].
 
-    `launcher`: process id.  The memory is the PSS: memory that n processes share counts 1/n for each.  That of a service includes its standby
-    process, which starts 10 s after the service is ready.  A process that has ended is absent.
+    `launcher`: process id.  The memory is the PSS: memory that n processes share counts 1/n for each.  That of a
+    service includes its standby process, which starts 10 s after the service is ready.  A process that has ended is
+    absent.
     """
     found: dict[str, float] = {}
     for pid in (launcher, *_children(launcher)):
