@@ -17,13 +17,18 @@ from experiments.claims.ch8_reaching.changed_worlds import (
     FixedRate,
     Hand,
     LikelihoodRatio,
+    failures,
     plant_of,
+    relative,
+    runs_of,
     seen_plant,
     targets,
 )
+from experiments.kit.cells import Cell
 from experiments.kit.experiment import judged
 from experiments.kit.learning.arm import RIGHT
 from experiments.kit.reaching.arm import MARKER, JudgedPlant, reach_space
+from tests.experiments.finished_cells import finished
 
 
 def test_the_balls_are_away_from_targets_and_robot():
@@ -71,13 +76,15 @@ def runs(score, failed, false=0):
     for change in CHANGES:
         for name in LEARNERS:
             found[change, name] = [
-                {
-                    "score": 6.0 * (plain if change == "nothing" and name == WITHOUT else ours),
-                    "failures": np.full(len(CHECKPOINTS), failed),
-                    "oracle": 6.0,
-                    "false": false if name == OURS else 0,
-                    "detected": np.inf,
-                }
+                [
+                    {
+                        "score": 6.0 * (plain if change == "nothing" and name == WITHOUT else ours),
+                        "failures": np.full(len(CHECKPOINTS), failed),
+                        "oracle": 6.0,
+                        "false": false if name == OURS else 0,
+                        "detected": np.inf,
+                    }
+                ]
             ] * 5
     return found
 
@@ -103,3 +110,15 @@ def test_a_hand_that_is_seen_corrects_joints_that_are_miscalibrated():
     found = corrected.reach(space.part, MARKER)
     assert hand.offsets.observations == before
     assert found.missing == pytest.approx(targets()[13].missing(plant.reached)) and (found.marker == plant.reached).all()
+
+
+def test_a_result_with_balls_is_computed_from_the_means_over_their_seeds():
+    def values(cell):
+        score = {"0": [1.0, 3.0], "1": [4.0, 4.0], "-1": [1.0, 3.0]}[str(cell.settings["ball"])][cell.seed]
+        found = {name: np.full((len(LEARNERS), 1), score) for name in ("score", "failures", "without")}
+        return found | {name: np.zeros(len(LEARNERS)) for name in ("false", "detected")} | {"oracle": 2.0}
+
+    settings = [{"change": "ball" if ball >= 0 else "table", "ball": ball} for ball in (0, 1, -1)]
+    found = runs_of(finished(values, [Cell(f"ball{one['ball']}-s{seed}", seed, one) for one in settings for seed in (1, 0)]))
+    assert relative(found["ball", OURS]).tolist() == [[1.0], [2.0]] and failures(found["ball", OURS]).tolist() == [[2.0], [4.0]]
+    assert relative(found["table", OURS]).tolist() == [[0.5], [1.5]]
