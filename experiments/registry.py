@@ -15,6 +15,7 @@ EXPERIMENTS = {
     "changed-actions": "experiments.claims.ch7_learning.changed_actions",
     "changed-outcomes": "experiments.claims.ch7_learning.changed_outcomes",
     "changed-worlds": "experiments.claims.ch8_reaching.changed_worlds",
+    "changed-worlds-live": "experiments.claims.ch8_reaching.changed_worlds_live",
     "chapter7": "experiments.claims.ch7_learning.chapter7",
     "constraint-discovery": "experiments.claims.ch7_learning.constraint_discovery",
     "constraint-violations": "experiments.claims.ch5_control.constraint_violations",

@@ -16,6 +16,7 @@ from mobee.simulation.motors import MotorParameters
 from services.common.cameras import require_cameras
 from services.common.config import WorldConfig
 from services.robot_sim.choice import EXTRA, PACKAGES, choose
+from services.robot_sim.sensors import errors_of
 from services.robot_sim.strength import with_torques
 
 NotNegative = Annotated[float, Meta(ge=0)]
@@ -47,6 +48,9 @@ class Config(WorldConfig, frozen=True, kw_only=True):
     encoder_noise: NotNegative = math.radians(0.1)
     """Standard deviation of the noise of the encoders at a tick of 20 ms, rad; at another tick dt it is larger by the factor sqrt(20 ms /
     dt)."""
+    encoder_errors: Mapping[str, float] = {}
+    """Constant errors of encoders (reading minus true position), rad, or m for motors that slide, by motor, as { r_elbow = 0.05 }: the
+    robot is miscalibrated. Motors that are not named have no error."""
     substep: Annotated[float, Meta(gt=0)] = 0.005
     """Longest time step of motors and physics, s."""
     jitter: Annotated[float, Meta(ge=0, le=0.1)] = 0.02
@@ -74,9 +78,11 @@ class Config(WorldConfig, frozen=True, kw_only=True):
     def check_robot(self, robot: Robot) -> None:
         """Raise MobeeError if the back-end cannot move the robot with these motors, or if a part's name cannot be used on the bus.
 
-        With `motors` = "identified", parameters must exist for this robot. Each pattern of `torques` must match a motor.
+        With `motors` = "identified", parameters must exist for this robot. Each pattern of `torques` must match a motor, and
+        `encoder_errors` must be finite errors of motors.
         """
         super().check_robot(robot)
+        errors_of(robot, self.encoder_errors)
         choose(self.backend, robot)
         with_torques(robot, self.torques)
         if self.motors == "identified":

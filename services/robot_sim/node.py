@@ -25,7 +25,7 @@ from services.robot_sim.config import Config
 from services.robot_sim.guard import Guard
 from services.robot_sim.kinematic import Backend
 from services.robot_sim.lockstep import START_PERIOD, Lockstep
-from services.robot_sim.sensors import Phases, Sensors, part_meta
+from services.robot_sim.sensors import Phases, Sensors, errors_of, part_meta
 from services.robot_sim.watch import Watch
 
 MIN_SPREAD_PERIOD = 0.0025  # s; in shorter ticks all parts are read at once, without waiting for their sampling times
@@ -58,7 +58,7 @@ class Node:
         record = StopRecord(Path(config.stop_record)) if config.stop_record else None
         self._guard = Guard(service, robot, backend, self._dt, record, config.speed)
         self._phases = Phases(tuple(robot.parts), config.jitter, config.seed)
-        self._sensors = Sensors(self._bus, robot, self._dt)
+        self._sensors = Sensors(self._bus, robot, self._dt, errors_of(robot, config.encoder_errors))
         self._clock = self._bus.publisher(Clock)
         self._clock_period = max(1, round(1.0 / (MAX_CLOCK_RATE * self._period)))  # ticks
         self._watch = Watch(self._bus, robot, backend, self._guard, max(1, round(config.rate / config.truth_rate)))

@@ -13,6 +13,7 @@ from bus_schema import VERSION
 from bus_schema.messages import PartStatus, State, Tick
 from bus_schema.rpc import PartMeta
 from mobee.arrays import Array
+from mobee.errors import InvalidValue
 from mobee.robot.robot import Robot
 from mobee.simulation.motors import Motors
 from services.common.bus import Bus
@@ -60,14 +61,28 @@ def part_meta(robot: Robot, part: str) -> PartMeta:
     )
 
 
+def errors_of(robot: Robot, errors: Mapping[str, float]) -> Array:
+    """Return the constant errors of all encoders (n,), rad, or m for motors that slide, from those that are given by motor.
+
+    Raises UnknownName for a name that is not a motor, and InvalidValue for an error that is not finite.
+    """
+    found = np.zeros(len(robot.motors))
+    for name, error in errors.items():
+        if not np.isfinite(error):
+            raise InvalidValue(f"encoder error {error!r} of {name}: give a finite angle [rad], or length [m] for a motor that slides")
+        found[robot.motor_index(name)] = error
+    return found
+
+
 class Sensors:
     """The newest sample of every part, and the streams `tick` and `{part}/state` that publish the samples.
 
     A sample has the encoder positions, velocities and torques of the part's motors at one time.
     """
 
-    def __init__(self, bus: Bus, robot: Robot, dt: float) -> None:
-        self._bus, self._dt = bus, dt
+    def __init__(self, bus: Bus, robot: Robot, dt: float, errors: Array) -> None:
+        """`dt`: the tick, s. `errors`: (n,) rad, constant errors of the encoders, reading minus true position."""
+        self._bus, self._dt, self._errors = bus, dt, errors
         self._where = {name: part.slice for name, part in robot.parts.items()}
         self._streams = {part: bus.publisher(State, part) for part in robot.parts}
         self._tick = bus.publisher(Tick)
@@ -97,7 +112,7 @@ class Sensors:
         sample, are published on `{part}/state`. `gates`: the safety gate of each part, whose state is published, too.
         """
         q, dq, tau = motors.q, motors.motor_velocities, motors.efforts
-        noise = motors.encoders(self._bus.k, self._dt) - q
+        noise = motors.encoders(self._bus.k, self._dt) - q + self._errors
 
         def read(where: slice, share: Array | float) -> None:
             q_before, dq_before = self._q_before[where], self._dq_before[where]
@@ -121,7 +136,7 @@ class Sensors:
         Tick 0, in which nothing moves, is read without noise. `gates`: the safety gate of each part, whose state is published, too.
         """
         k = self._bus.k
-        self._q = motors.encoders(k, self._dt) if k else motors.q
+        self._q = (motors.encoders(k, self._dt) if k else motors.q) + self._errors
         self._dq, self._tau = motors.motor_velocities, motors.efforts
         for part, gate in gates.items():
             self._report(part, self._bus.t, gate)

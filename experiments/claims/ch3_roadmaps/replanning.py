@@ -112,7 +112,7 @@ def cross(folder: Path, job: Job, seed: int, lockstep: bool = False, backend: st
     clock.  `backend`: physics engine, "pybullet" or "mujoco".  Raises LaunchFailed if the system fails or does not end.
     """
     write_job(folder, job)
-    names = {"world": str(WORLD), "simulated": str(SIMULATED), "backend": backend}
+    names: dict[str, Any] = {"world": str(WORLD), "simulator": {"world": str(SIMULATED), "backend": backend}}
     seconds = LONGEST * (1 + len(job.after))
     return launch(folder, PERFORM, title="Replanning", seed=seed, rate=RATE, speed=SPEED, seconds=seconds, lockstep=lockstep, **names)
 

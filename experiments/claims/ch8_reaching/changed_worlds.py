@@ -32,7 +32,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from functools import cache, partial
 from typing import Any
 
@@ -43,21 +42,18 @@ from experiments.kit.learning.arm import RIGHT, robot, table_world
 from experiments.kit.learning.exploration import begin_anywhere, explore
 from experiments.kit.plots import draw_curve, finish, new_figure, ticks_at
 from experiments.kit.reaching.arm import MARKER, TRANSITIONS, Errors, JudgedPlant, laws, reach_space
+from experiments.kit.reaching.seen_hand import SeenHand
 from experiments.kit.reaching.targets import grid, targets_at
-from experiments.kit.reaching.truth import BLOCKED, Known, Truth
+from experiments.kit.reaching.truth import BLOCKED, Known, Truth, failed_transitions, remaining_errors
 from experiments.kit.rules import decides, equivalent, row
 from experiments.kit.statistics import estimate, interval
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped_by
-from experiments.kit.wrapped_plant import WrappedPlant
 from mobee import CuriousAgent, Model, OfflinePlant, TransitionModel, World, sphere
 from mobee.arrays import Array
-from mobee.learning.neighbours import NO_ACTION
 from mobee.learning.reaching.changes import HAZARDS, SHARES, DetectorOf
-from mobee.learning.reaching.evaluation import move, reach
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.plant import Plant
-from mobee.reach import ReachOutcome, ReachPlant, ReachTarget
-from mobee.vision.calibration.self_calibration import NOISE, JointOffsets, SelfCalibratingPlant
+from mobee.reach import ReachTarget
 
 LAW = "published"
 TRIES = 200  # before the change
@@ -136,53 +132,6 @@ LEARNERS: dict[str, tuple[str | DetectorOf, bool]] = {  # the detector, and whet
     "run length, sees": ("run_length", True),
 }
 OURS, WITHOUT = "run length, sees", "no detector"
-
-
-class Hand:
-    """What a learner knows by seeing its hand: `offsets`, the estimated errors of the encoders.
-
-    They are kept when the world changes.  `is_seen`: whether the hand is seen at present.
-    """
-
-    def __init__(self, seed: int) -> None:
-        self.offsets, self.is_seen = JointOffsets(Model(robot()), MARKER, RIGHT), True
-        self._rng = np.random.default_rng(seed)
-
-    def see(self, plant: JudgedPlant) -> Array | None:
-        """Return the position at which the hand is seen, (3,) m, with a random error of 5 mm along each axis; None if it is not seen."""
-        error = self._rng.normal(0.0, NOISE, 3)
-        return plant.marker_at(MARKER) + error if self.is_seen else None
-
-    def correct(self, plant: JudgedPlant) -> SeenPlant:
-        """Return a plant that acts by `plant`, and corrects the encoders by the position at which the hand is seen."""
-        return SeenPlant(SelfCalibratingPlant(plant, self.offsets, lambda: self.see(plant)), plant)
-
-
-class SeenPlant(WrappedPlant[SelfCalibratingPlant]):
-    """A self-calibrating plant whose reaches are judged by the true position of the hand, as those of the other learners are.
-
-    `judge`: the plant inside, which knows the true position.
-    """
-
-    def __init__(self, inner: SelfCalibratingPlant, judge: JudgedPlant) -> None:
-        super().__init__(inner)
-        self.model, self._judge, self._target = judge.model, judge, ReachTarget(np.zeros(3))
-
-    def present(self, target: ReachTarget | None) -> None:
-        """Present a target to the plant inside, or remove it (None); as in `mobee.reach.ReachPlant.present`.
-
-        The last target is kept to judge the reach.
-        """
-        self._target = target or self._target
-        super().present(target)
-
-    def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
-        """Reach as `mobee.reach.ReachPlant.reach` does; the outcome has the true position of the marker and the true error that remains.
-
-        `part`, `marker`, `stay`: as in that method.
-        """
-        found, where = super().reach(part, marker, stay), self._judge.reached
-        return replace(found, marker=where, missing=self._target.missing(where))
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
@@ -276,7 +225,7 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 def _learned(detector: str | DetectorOf, sees: bool, settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Return the results of one learner, see `trial`."""
-    hand = Hand(seed)
+    hand = SeenHand(robot(), RIGHT, seed)
     correct = hand.correct if sees else lambda plant: plant
     agent = ReachAgent(
         reach_space(), correct(plant_of("nothing", -1, seed + 500)), model_of(seed).debiased(), marker=MARKER,
@@ -323,63 +272,17 @@ def oracle_score(change: str, ball: int) -> float:
     `plant_of`.
     """
     places, space = np.array([target.position for target in targets()]), reach_space()
-    truth = Truth(places, rewards_missing(change, ball)[:, :, None], np.zeros((len(places), *space.goals.shape)))
+    missing = remaining_errors(plant_of(change, ball, TRUTH_SEED), space, targets())
+    truth = Truth(places, missing[:, :, None], np.zeros((len(places), *space.goals.shape)))
     oracle = ReachAgent(
         space, plant_of(change, ball, TRUTH_SEED + 1), model_of(0).debiased(), marker=MARKER,
         predictor=Known(truth, 0.01), strategy="greedy", failures="local",
     )  # fmt: skip
-    for state, action in np.argwhere(blocked(change, ball) >= BLOCKED).tolist():
+    for state, action in np.argwhere(failed_transitions(plant_of(change, ball, TRUTH_SEED), space, 2) >= BLOCKED).tolist():
         for place in places:
             oracle.failures.add(state, action, place, oracle.penalty)
     oracle.learn(targets(), 3 * len(places))
     return float(oracle.evaluate(targets(), 10).scores.mean())
-
-
-def rewards_missing(change: str, ball: int) -> Array:
-    """Measure one reach from each of the S states for each of the T targets; returns the remaining errors, (T, S) m.
-
-    NaN where the state was not entered.  `change`, `ball`: the world, as in `plant_of`.
-    """
-    plant, space = plant_of(change, ball, TRUTH_SEED), reach_space()
-    missing = np.full((len(targets()), len(space)), np.nan)
-    for state in range(len(space)):
-        inside = _entered(plant, state)
-        for number, target in enumerate(targets()):
-            if not inside and not (inside := _entered(plant, state)):
-                break
-            plant.present(target)
-            outcome, following = reach(plant, space, MARKER)
-            missing[number, state], inside = outcome.missing, following == state
-    return missing
-
-
-def blocked(change: str, ball: int) -> Array:
-    """Try each transition twice without a target, and return the share of tries that did not end in its goal, (S, A).
-
-    `change`, `ball`: the world, as in `plant_of`.  Tries that could not be made, because a state was not entered, count as successes.
-    """
-    plant, space, rng = plant_of(change, ball, TRUTH_SEED), reach_space(), np.random.default_rng(0)
-    left, failed = 2 * (space.goals != NO_ACTION), np.zeros(space.goals.shape)
-    plant.present(None)
-    _begin(plant, 0)
-    while left.any():
-        state = space.state_of(plant.measure(space.part))
-        if not left[state].any():
-            goal = int(rng.choice(np.flatnonzero(left.any(axis=1))))
-            if not _entered(plant, goal):
-                left[goal] = 0
-            continue
-        action = int(rng.choice(np.flatnonzero(left[state])))
-        left[state, action] -= 1
-        failed[state, action] += move(plant, space, state, action)[1] != space.goals[state, action]
-    return failed / 2.0
-
-
-def _entered(plant: ReachPlant, state: int) -> bool:
-    """Go to a state without a target, in at most three actions; return whether it was entered."""
-    plant.present(None)
-    space = reach_space()
-    return any(space.state_of(plant.act(space.part, space.target(state)).q) == state for _ in range(3))
 
 
 Worlds = list[list[dict[str, Any]]]  # the runs in each world; only with balls there is more than one seed in a world

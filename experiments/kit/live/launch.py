@@ -170,10 +170,9 @@ seed = {seed}
 {mode}
 
 [services.robot_sim]
-backend = "{backend}"
-world = "{simulated}"
 rate = {rate:g}
 record = "{folder}"
+{simulator}
 
 [services.model]
 world = "{world}"
@@ -199,8 +198,7 @@ def launch(
     speed: float,
     seconds: float,
     lockstep: bool = True,
-    simulated: str = "",
-    backend: str = PHYSICS[0],
+    simulator: Mapping[str, Any] = {},
 ) -> dict[str, Any]:
     """Launch the live iCub with physics and a performer, wait for its end, and return its summary.  Raises LaunchFailed.
 
@@ -216,14 +214,22 @@ def launch(
         speed: share of the motors' largest speed.
         seconds: robot time after which the system ends at the latest.
         lockstep: whether the ticks wait for all services; False: real time.
-        simulated: name or path of the simulator's world; "": `world`.
-        backend: physics engine of robot_sim, "pybullet" or "mujoco".
+        simulator: further settings of robot_sim: text, numbers and dicts of these.  The default of "backend" is "pybullet", that of "world"
+            is `world`.
     """
     folder.mkdir(parents=True, exist_ok=True)
     mode = f'mode = "lock"\npatience = {TICK_TIMEOUT:g}' if lockstep else ""
     scenario = folder / "scenario.toml"
-    values: dict[str, Any] = {"title": title, "world": world, "simulated": simulated or world, "seed": seed, "mode": mode}
-    values |= {"rate": rate, "speed": speed, "perform": perform, "backend": backend}
+    settings = "\n".join(f"{name} = {_toml(value)}" for name, value in ({"backend": PHYSICS[0], "world": world} | dict(simulator)).items())
+    values: dict[str, Any] = {"title": title, "world": world, "simulator": settings, "seed": seed, "mode": mode}
+    values |= {"rate": rate, "speed": speed, "perform": perform}
     scenario.write_text(_SCENARIO.format(folder=folder.resolve(), **values))
     limit: dict[str, Any] = {"ticks": round(seconds * rate)} if lockstep else {"duration": seconds}
     return summary_of(str(scenario), runs=folder / "launch", **limit)
+
+
+def _toml(value: Any) -> str:
+    """Write text, a number, or a dict of these as TOML."""
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{name} = {_toml(one)}" for name, one in value.items()) + " }"
+    return json.dumps(value)

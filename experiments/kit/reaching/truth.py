@@ -11,8 +11,9 @@ chance, and slightly if it knows how transitions fail.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -26,7 +27,7 @@ from mobee.learning.neighbours import NO_ACTION
 from mobee.learning.reaching.evaluation import move, reach
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.value_iteration import OutcomeModel
-from mobee.reach import ReachTarget
+from mobee.reach import ReachPlant, ReachTarget
 
 TRIES = 5  # of every reach and transition
 SEED = 9001  # not used by learners
@@ -189,7 +190,7 @@ class Known:
         raise InvalidValue("known rewards have no distribution to draw from.")
 
 
-def oracle(truth: Truth, space: Space, plant: OfflinePlant, beliefs: OutcomeModel, marker: str, scale: float, seed: int) -> ReachAgent:
+def oracle(truth: Truth, space: Space, plant: ReachPlant, beliefs: OutcomeModel, marker: str, scale: float, seed: int) -> ReachAgent:
     """Return an agent that knows the true rewards and the blocked transitions; it is to be evaluated on the measured targets.
 
     `truth`: the measured results.  `marker`: name of the marker that reaches.  `seed`: of the agent.  `beliefs`: transition model without
@@ -201,3 +202,54 @@ def oracle(truth: Truth, space: Space, plant: OfflinePlant, beliefs: OutcomeMode
         for state, action in np.argwhere(np.nan_to_num(blocked) >= BLOCKED).tolist():
             agent.failures.add(state, action, place, agent.penalty)
     return agent
+
+
+Enter = Callable[[int], bool]  # goes to a state, and returns whether it was entered
+
+
+def remaining_errors(plant: ReachPlant, space: Space, targets: Sequence[ReachTarget], enter: Enter | None = None) -> Array:
+    """Make one reach from each of the S states for each of the T targets; returns the remaining errors, (T, S) m.
+
+    NaN where the state was not entered.  The plant moves.  `enter`: function that brings it to a state; None: by up to three actions.
+    """
+    enter = enter or partial(_entered, plant, space)
+    missing = np.full((len(targets), len(space)), np.nan)
+    for state in range(len(space)):
+        inside = enter(state)
+        for number, target in enumerate(targets):
+            if not inside and not (inside := enter(state)):
+                break
+            plant.present(target)
+            outcome, following = reach(plant, space, MARKER)
+            missing[number, state], inside = outcome.missing, following == state
+    return missing
+
+
+def failed_transitions(plant: ReachPlant, space: Space, tries: int, enter: Enter | None = None) -> Array:
+    """Try each transition without a target, and return the share of the tries that did not end in its goal, (S, A).
+
+    `tries`: number of tries of each transition.  Tries that could not be made, because a state was not entered, count as successes.
+    `enter`: as of `remaining_errors`.
+    """
+    enter = enter or partial(_entered, plant, space)
+    rng = np.random.default_rng(0)
+    left, failed = tries * (space.goals != NO_ACTION), np.zeros(space.goals.shape)
+    plant.present(None)
+    plant.act(space.part, space.target(int(np.random.default_rng(0).integers(len(space)))))
+    while left.any():
+        state = space.state_of(plant.measure(space.part))
+        if not left[state].any():
+            goal = int(rng.choice(np.flatnonzero(left.any(axis=1))))
+            if not enter(goal):
+                left[goal] = 0
+            continue
+        action = int(rng.choice(np.flatnonzero(left[state])))
+        left[state, action] -= 1
+        failed[state, action] += move(plant, space, state, action)[1] != space.goals[state, action]
+    return failed / tries
+
+
+def _entered(plant: ReachPlant, space: Space, state: int) -> bool:
+    """Go to a state without a target, in at most three actions; return whether it was entered."""
+    plant.present(None)
+    return any(space.state_of(plant.act(space.part, space.target(state)).q) == state for _ in range(MAX_ENTRIES))

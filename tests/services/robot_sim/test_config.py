@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mobee.errors import UnknownName
+from mobee.errors import InvalidValue, UnknownName
 from mobee.robot.load import load_robot
 from mobee.simulation.motors import MotorParameters
 from services.robot_sim.config import Config
@@ -28,3 +28,11 @@ def test_identified_motors_are_those_of_the_offline_plant() -> None:
 def test_a_robot_whose_motors_were_not_identified_is_refused() -> None:
     with pytest.raises(UnknownName, match="identified robot"):
         make_backend(Config(backend="kinematic", motors="identified"), load_robot("katana"))
+
+
+@pytest.mark.parametrize(
+    ("errors", "error", "text"), [({"l_elbo": 0.1}, UnknownName, "l_elbow"), ({"l_elbow": np.inf}, InvalidValue, "finite")]
+)
+def test_encoder_errors_are_finite_errors_of_motors(errors: dict[str, float], error: type[Exception], text: str) -> None:
+    with pytest.raises(error, match=text):
+        Config(backend="kinematic", encoder_errors=errors).check_robot(load_robot("icub"))

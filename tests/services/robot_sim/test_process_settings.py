@@ -8,6 +8,7 @@ import signal
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from bus_schema import keys
@@ -55,6 +56,18 @@ def test_physics_stops_a_hand_at_the_table_and_the_truth_tells_the_depth(tmp_pat
         started = time.monotonic()
         assert bench.program.stop(signal.SIGTERM) == 0
         print(f"\nended {time.monotonic() - started:.3f} s after SIGTERM")
+
+
+def test_encoders_have_the_errors_that_are_set_and_the_truth_has_none(tmp_path: Path) -> None:
+    settings = tmp_path / "errors.toml"
+    settings.write_text('backend = "kinematic"\nencoder_errors = { l_elbow = 0.09 }\n')
+    with rig(tmp_path, ROBOT) as bus:
+        bench = Bench(bus, "--config", str(settings))
+        index, where = ROBOT.motor_index("l_elbow"), ROBOT.part("left_arm").slice
+        wait_for(lambda: bench.truths and bench.now() > 20, "ticks")
+        errors = np.array(bench.newest("left_arm").q) - np.array(bench.truths[-1].q)[where]
+        assert errors[index - where.start] == pytest.approx(0.09, abs=0.015)
+        assert np.delete(errors, index - where.start) == pytest.approx(0.0, abs=0.015)
 
 
 def test_a_new_process_is_a_new_run_in_which_no_old_epoch_fits(tmp_path: Path) -> None:

@@ -221,7 +221,7 @@ def perform(folder: Path, job: Job, seed: int, rate: float = RATE, backend: str 
     """
     write_job(folder, job)
     world, seconds = WITH_OBSTACLE if job.kind == "moving" else TABLE, MAX_TRY * max(1, len(job.problems) + job.tries)
-    names: dict[str, Any] = {"title": f"Reaching with {backend}: {job.kind}", "world": str(world), "backend": backend}
+    names: dict[str, Any] = {"title": f"Reaching with {backend}: {job.kind}", "world": str(world), "simulator": {"backend": backend}}
     summary = launch(folder, PERFORM, seed=seed, rate=rate, speed=1.0, seconds=seconds, **names)
     return bool(summary["lockstep"]["repeatable"])
 

@@ -15,7 +15,6 @@ from experiments.claims.ch8_reaching.changed_worlds import (
     TURN,
     WITHOUT,
     FixedRate,
-    Hand,
     LikelihoodRatio,
     failures,
     plant_of,
@@ -26,8 +25,9 @@ from experiments.claims.ch8_reaching.changed_worlds import (
 )
 from experiments.kit.cells import Cell
 from experiments.kit.experiment import judged
-from experiments.kit.learning.arm import RIGHT
+from experiments.kit.learning.arm import RIGHT, robot
 from experiments.kit.reaching.arm import MARKER, JudgedPlant, reach_space
+from experiments.kit.reaching.seen_hand import SeenHand
 from tests.experiments.finished_cells import finished
 
 
@@ -98,7 +98,7 @@ def test_claims_are_judged_by_scores_failures_and_the_unchanged_world():
 
 def test_a_hand_that_is_seen_corrects_joints_that_are_miscalibrated():
     """The learner's plant finds the offsets, and the result is judged by the true place of the hand."""
-    hand, plant = Hand(0), plant_of("turn", -1, 0)
+    hand, plant = SeenHand(robot(), RIGHT, 0), plant_of("turn", -1, 0)
     corrected = hand.correct(plant)
     space = reach_space()
     for state in (40, 41, 50, 31, 44, 13):
