@@ -20,7 +20,7 @@ are only similar, and contacts do not stop it.  Then the learner makes 60 live t
 
 The oracle knows the reward of one reach from each state for each target, and the transitions that failed in one of two tries without a
 target, measured on the offline plant in the changed world, which is put into each state: on the live robot this would take two hours.
-Failures due to targets it has learned in three live tries of each.  As its rewards are single samples of another plant, a learner can exceed
+Failures due to targets it has learned in three live tries of each.  Its rewards are single samples of another plant: a learner can exceed
 its score.  The oracle's encoders are as wrong as the learner's.  All are judged by the simulator's joint positions.
 """
 
