@@ -32,7 +32,8 @@ _INDENT = 16  # of the lines below a verdict
 _HEAD = f"""\
 # Experiments
 
-Published claims, the numbers that this project measured, and verdicts. `mobee experiment claims --write` writes this page from
+Claims of Mikhail Frank's thesis (2014) and of the paper by Frank, Leitner, Stollenga, Förster and Schmidhuber (2014), the numbers that this
+project measured, and verdicts. `mobee experiment claims --write` writes this page from
 the runs with the most seeds, and of those from the newest; do not edit it. [Results](../docs/results.md#the-thesis-chapter-by-chapter) is
 the summary, chapter by chapter.
 
@@ -60,9 +61,9 @@ is none; MoBeE must be installed on all of them in the same version. `--quick` r
 - That two things are equal is confirmed by an equivalence test: the whole interval of their difference lies within a stated margin.
 - A claim is one row. Where the publications leave a setting open, the row has the verdict of each setting, and its text the numbers.
 - A verdict needs {MIN_SEEDS} repetitions or more.
-- The p value of a row is the smallest error rate of its intervals at which it has the same verdict. By Benjamini and Hochberg's procedure
-  over all rows, a row whose p value is too large is open, so that at most {100 * FALSE_DISCOVERIES:.0f} % of the verdicts by intervals are
-  expected to be wrong.
+- The p value of a row is one minus the highest confidence level of its intervals at which it still has its verdict. By
+  Benjamini and Hochberg's procedure over all rows, a row whose p value is too large is open, so that at most
+  {100 * FALSE_DISCOVERIES:.0f} % of the verdicts by intervals are expected to be wrong.
 - [frozen.json](frozen.json) has the constants of the rules, among them the thresholds. After they were frozen, some experiments were run
   once more with seeds from {CONFIRMING_SEED} on (`mobee experiment run NAME --seed {CONFIRMING_SEED} --seeds 30`); the column "new seeds"
   has these verdicts.
@@ -70,11 +71,17 @@ is none; MoBeE must be installed on all of them in the same version. `--quick` r
 ## Terms
 
 **state-action**: one action in one state. **prior 50-50**: before its first try, an action is imagined to fail
-once and to succeed once; **60-40**: to fail once and to succeed twice. **constrained**, **free**: the left arm with its cable constraints
-and self-contacts, and without both. **ghost**: a table that exerts no force. **P**: the probability that a run of the agent named first
-is better than a run of the other, with ties counted half.
+once and to succeed once; **60-40**: to fail once and to succeed twice. **'Kail' divergence**: the information gain with
+which the thesis rewards an action, the KL divergence of the belief after an observation from the belief before it
+([learning](../docs/learning.md)). **hypercube**: four motors with two positions each, 16 states with 4 actions each.
+**settle speed**: the speed below which an action counts as ended. **cable force**: the largest force of the constraints
+of the shoulder's cables. **constrained**, **free**: the left arm with its cable constraints and self-contacts, and
+without both. **ghost**: a table that exerts no force. **P**: the probability that a run of the agent named first is
+better than a run of the other, with ties counted half. In brackets after a verdict: what the publications leave open,
+with the values with which the claim holds, is open, or fails.
 
-Where states have 16 neighbours, many samples have the same distance, and it is drawn at random which become neighbours. In
+An action leads from one state, a posture, to a near one, its neighbour. Where states have 16 neighbours, many other states have the same
+distance, and it is drawn at random which of them become neighbours: the graph. In
 exploration-coverage and neighbour-count each seed draws its own graph. Elsewhere all seeds share one (tie seed 0): there the
 intervals include noise, starts and random choices, but not the draw of the graph, and a result may be a property of that graph.
 """

@@ -290,10 +290,11 @@ Runs = Mapping[tuple[str, str], Worlds]  # by change and learner
 
 
 def runs_of(found: Cells) -> Runs:
-    """Group the results of the finished runs by (change, learner), and in each group by world.
+    """Return a dict from (change of the world, learner) to the results of its finished runs, which are grouped by world.
 
-    A world is one of the balls with all its seeds; of the other changes, each seed counts as a world.  The results are those of `trial`,
-    but of one learner each.
+    After the change "ball", the world depends on which of the 20 balls has appeared: the runs with the same ball and different seeds form a
+    group.  After the other changes, each run is a group by itself.  A result has the keys that `trial` returns, but the numbers of this
+    learner alone.
     """
     worlds: dict[str, Worlds] = {}
     for (change, ball), group in sorted(grouped_by(found, "change", "ball").items()):

@@ -332,7 +332,11 @@ Runs = Mapping[str, list[dict[str, Any]]]  # by change
 
 
 def runs_of(found: Cells) -> Runs:
-    """Group the results of the learner by change, each with the `oracle`'s score; changes without a finished oracle are left out."""
+    """Return a dict from the change of the world to the results of the learner's runs after it, sorted by seed.
+
+    A result has the arrays that `trial` returns, but for this change alone, (L,), and under "oracle" the score of the agent that knows the
+    changed world.  A change is left out until the run of its oracle has finished.
+    """
     learners = [one for one in found.values() if one.cell.settings["runs"] == "learner"]
     others = [one for one in found.values() if one.cell.settings["runs"] == "oracle"]
     oracles = {one.cell.settings["changes"][0]: float(one.values["score"][0, 0]) for one in others}
