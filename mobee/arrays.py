@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Array types, and the checks of arguments that are arrays or numbers of threads."""
+"""Array types, and checks of arguments: of arrays, and of a number of threads."""
 
 from __future__ import annotations
 
 import reprlib
+from numbers import Real
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,12 +20,12 @@ MAX_THREADS = 1024
 def real_array(what: str, given: ArrayLike) -> Array:
     """Return a C-contiguous float64 copy of the given numbers; raises InvalidValue unless all are real numbers.
 
-    `what`: name of the array in the error message. Text and complex numbers are refused too: NumPy would convert the text to numbers
-    and drop the imaginary parts.
+    `what`: name of the array in the error message. Text, dates and complex numbers are refused too: NumPy would convert the first two to
+    numbers and drop the imaginary parts.
     """
     try:
         value = np.array(given, order="C")
-        if value.dtype.kind in "SU":
+        if value.dtype.kind not in "biufcO" or value.dtype.kind == "O" and not all(isinstance(one, Real) for one in value.flat):
             raise ValueError
         if value.dtype.kind != "c":
             return value if value.dtype == np.float64 else value.astype(np.float64)

@@ -7,7 +7,7 @@ import json
 import sqlite3
 import time
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -48,7 +48,7 @@ class AgentFile:
             self._release = weakref.finalize(self, unlock, self.path, agent)  # a store that nobody closes releases its lock too
 
     def bind(self, settings: dict[str, Any]) -> None:
-        """Record the agent's settings (JSON values, by name), or compare them with the record; raises MobeeError if they differ from it."""
+        """Record the agent's settings (JSON values, by name); if settings are recorded already, raise MobeeError unless they are equal."""
         given = _texts(settings)
         with explained(self.path), transaction(self._db):
             known = dict(self._db.execute("SELECT key, value FROM meta WHERE agent = ?", (self.agent,)))
@@ -190,9 +190,9 @@ class TransitionStore(AgentFile):
         self._last = transition.n
 
     def continue_from(self, source: str | Path, settings: dict[str, Any]) -> None:
-        """Copy this agent's transitions from the file `source`; nothing is done if this file already has a record of the agent.
+        """Copy this agent's transitions from the file `source`; nothing is done if this file already has settings or transitions of it.
 
-        They must have been recorded with `settings`, except the settings of the plant: a record that was made offline may be continued
+        They must have been recorded with `settings`, except the settings of the plant: transitions that were made offline may be continued
         live. The number of copied transitions and the settings of their plant are recorded in the setting "continued". Raises MobeeError
         if `source` has no transitions of the agent, or other settings.
         """
@@ -210,18 +210,25 @@ class TransitionStore(AgentFile):
         with explained(self.path), transaction(self._db):
             self._record(_texts(settings | {CONTINUED: origin}))
             self._db.executemany(f"INSERT INTO transitions VALUES ({', '.join('?' * len(rows[0]))})", rows)
+            self._write_explorers(changes)
         self._last = len(rows)
-        for n, explorer in changes.items():
-            self.change_explorer(n, explorer)
 
     def change_explorer(self, n: int, explorer: str) -> None:
-        """Record the name of the explorer that chooses the actions after the first `n` transitions; it is on disk on return."""
+        """Record the name of the explorer (exploration strategy) that chooses the actions after the first `n` transitions.
+
+        The record is on disk when this method returns.
+        """
         with explained(self.path), transaction(self._db):
+            self._write_explorers({n: explorer})
+
+    def _write_explorers(self, changes: Mapping[int, str]) -> None:
+        """Write changes of the explorer, by the number of transitions before each, within a transaction."""
+        if changes:
             self._db.execute(EXPLORERS)
-            self._db.execute("INSERT OR REPLACE INTO explorers VALUES (?, ?, ?)", (self.agent, n, explorer))
+            self._db.executemany("INSERT OR REPLACE INTO explorers VALUES (?, ?, ?)", [(self.agent, *one) for one in changes.items()])
 
     def explorers(self, agent: str | None = None) -> dict[int, str]:
-        """Return the recorded changes of the explorer of the named agent (None: this agent).
+        """Return the recorded changes of the explorer (exploration strategy) of the named agent (None: this agent).
 
         Keys: the number of transitions before the change. Values: the name of the new explorer.
         """

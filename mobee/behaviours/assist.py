@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Torso assist: moves the base of an arm so that the target is at a place that the arm reaches well (thesis 9.4.2).
 
-The quality of a place is a function of its position relative to the arm's base link, with that link at home: the rewards that a reach
-learner predicts, which has learned with the torso at home, or the manipulability of the arm.
+The worth of a place says how well the arm reaches it with its base link at home: it is the reward that a reach learner predicts, trained
+with the torso at home, or the manipulability of the arm. If the base moves, a target counts as the place that has the same position
+relative to the base at home.
 """
 
 from __future__ import annotations
@@ -96,7 +97,7 @@ class Assist:
 
 
 def base_link(robot: Robot, arm: str) -> int:
-    """Return the number of the link that carries the first joint of the part `arm`; raise UnknownName if there is no such part."""
+    """Return the index of the parent link of the first joint of the part `arm`; raise UnknownName if there is no such part."""
     span = robot.part(arm).slice
     driven = (robot.coupling[0][:, span] != 0.0).any(axis=1)
     return robot.joints[int(np.flatnonzero(driven)[0])].parent
@@ -105,7 +106,7 @@ def base_link(robot: Robot, arm: str) -> int:
 def learned_worth(predictor: RewardPredictor) -> Worth:
     """Return a function of places (k, 3) m: the largest reward that a reach learner predicts for a target at each place, (k,).
 
-    The maximum is over all states that the learner `predictor` has.
+    `predictor`: the learner's predictor of rewards; the largest reward is taken over all states of the learner.
     """
     return lambda places: np.array([float(predictor.mean(place).max()) for place in places])
 
@@ -114,14 +115,17 @@ def manipulability_worth(robot: Robot, arm: str, marker: str, seed: int = 0) -> 
     """Return a function of places (k, 3) m: the arm's manipulability sqrt(det J J^T) near each place, as a share of its maximum, (k,).
 
     Unlike `learned_worth` it needs no learner. The manipulability is computed in random postures; postures in which the robot touches
-    itself are ignored. For a place that is not near to the marker in any posture, the value is minus the distance [m] from the nearest
-    position.
+    itself are ignored. For a place that is not near the marker (5 cm) in any posture, the value is minus its distance [m] from the nearest
+    position of the marker.
 
     Args:
         robot: the robot, whose other parts are at home.
         arm: the part that reaches.
         marker: name of the marker with which the arm reaches.
         seed: seed of the random postures.
+
+    Raises:
+        InvalidValue: in all random postures the robot touches itself, or the arm cannot move the marker in all three directions.
     """
     model, span = Model(robot), robot.part(arm).slice
     q = np.repeat(robot.home[None], SAMPLES, axis=0)
@@ -130,10 +134,12 @@ def manipulability_worth(robot: Robot, arm: str, marker: str, seed: int = 0) -> 
     q = q[np.asarray(model.evaluate(q).count) == 0]
     jacobian = model.jacobian(q, marker)[:, :3, span]
     dexterity = np.sqrt(np.maximum(np.linalg.det(jacobian @ np.swapaxes(jacobian, 1, 2)), 0.0))
+    if not (dexterity > 0.0).any():
+        raise InvalidValue(f"{arm} cannot move {marker} in three directions in any posture without contact: give another arm or marker.")
     tree, dexterity = cKDTree(model.evaluate(q).position(marker)), dexterity / dexterity.max()
 
     def worth(places: Array) -> Array:
-        distance, index = tree.query(places, k=16, distance_upper_bound=np.inf)
+        distance, index = tree.query(places, k=range(1, min(16, len(q)) + 1))
         near = (dexterity[index] * np.maximum(0.0, 1.0 - (distance / SPREAD) ** 2)).max(axis=1)
         return np.asarray(np.where(near > 0.0, near, -distance[:, 0]), dtype=np.float64)
 

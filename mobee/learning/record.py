@@ -32,6 +32,8 @@ def space_from(settings: Mapping[str, Any], robot: Robot) -> Space:
     if not isinstance(settings, Mapping):
         raise InvalidValue(f"{settings!r} is not the record of a space: give Space.settings.")
     kind = settings.get("kind", "lattice")
+    if kind == "discrete":
+        raise InvalidValue("the record is of a DiscreteSpace, without its goals: make DiscreteSpace(states, actions, goals) as before.")
     if kind not in kinds or not {"robot", "digest", "joints"} <= settings.keys():
         raise InvalidValue(f"the record with {', '.join(settings) or 'nothing'} (kind {kind!r}) is not of a space: give Space.settings.")
     if settings["robot"] != robot.name:

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The unit of each motor in the control law, and its limit zones.
+"""The unit in which the control law counts the position of each motor, and the motor's limit zones.
 
-The numbers of the law are angles. A motor that slides has no angle, so its range counts as the angle SLIDE_RANGE: 1 rad is then
-range / SLIDE_RANGE of its own unit, the metre of a URDF. In this unit a slide of 4 cm and one of 2 m behave alike.
+The control law computes with angles. A motor that slides has no angle, so its whole range counts as the angle SLIDE_RANGE (200 deg): 1 rad
+is then range / SLIDE_RANGE of its own unit, the metre of a URDF. In this unit a slide of 4 cm and one of 2 m behave in the same manner.
 
-Thresholds of rest, play and noise use a smaller unit for slides, FINE times the unit of the law. With the unit of the law itself a
-lift of 35 cm would count as at rest 2 mm before its goal.
+Thresholds of rest, backlash and encoder noise use a smaller unit for slides, FINE (0.25) times the unit of the law. With the unit of the
+law itself, a slide with a range of 35 cm would count as at rest when it is still 2 mm from its goal.
 """
 
 from __future__ import annotations
@@ -26,11 +26,16 @@ def slides(robot: Robot, motor: Motor) -> bool:
     return bool(motor.joints) and all(robot.joints[joint].kind == "prismatic" for joint, _, _ in motor.joints)
 
 
-def angle_unit(limits: Array, sliding: bool) -> float:
-    """Return the motion of a motor that counts as 1 rad in the control law, in the motor's own unit.
+def unit_name(robot: Robot, motor: Motor) -> str:
+    """Return the name of the unit of the motor's position: "m" for a motor that slides, "rad" for all others."""
+    return "m" if slides(robot, motor) else "rad"
 
-    `limits`: (2,) rad or m. `sliding`: whether the motor is a slide. It is 1 for a motor that turns, and range / SLIDE_RANGE [m] for a
-    slide, where SLIDE_RANGE is 200 deg, so that the whole range of a slide counts as 200 deg.
+
+def angle_unit(limits: Array, sliding: bool) -> float:
+    """Return the motion of a motor, in its own unit, that counts as 1 rad in the control law.
+
+    `limits`: (2,) rad or m. `sliding`: whether the motor is a slide, that is, moves prismatic joints only. The result is 1 for a motor that
+    turns, and range / SLIDE_RANGE [m] for a slide, so that the whole range of a slide counts as SLIDE_RANGE (200 deg).
     """
     span = float(limits[1] - limits[0])
     return span / SLIDE_RANGE if sliding and 0.0 < span < np.inf else 1.0
@@ -49,7 +54,7 @@ def motor_units(robot: Robot) -> Array:
 
 @per_robot
 def fine_units(robot: Robot) -> Array:
-    """Return the motion of each motor that counts as 1 rad in thresholds of rest, play and noise, (n,), read-only.
+    """Return the motion of each motor that counts as 1 rad in thresholds of rest, backlash and encoder noise, (n,), read-only.
 
     It is 1 rad for a motor that turns, and for a slide FINE (0.25) times the length [m] of `mobee.robot.motor_units.motor_units`.
     """
@@ -63,8 +68,8 @@ def fine_units(robot: Robot) -> Array:
 def limit_zones(robot: Robot, width: Array) -> Array:
     """Return the widths of the zones at the lower and the upper limit of each motor, (n, 2), in the unit of the motor.
 
-    In a zone the control law pushes inward. `width` (n,): the width of the zones in the gains, in the unit of the motor. A zone is at most
-    WIDEST (1/4) of the motor's range. If the motor's `zone_ends_at_home` is set, a zone that would include the home position ends there.
+    In a zone the control law pushes inward. `width` (n,): the width that the gains give, in the unit of the motor. A zone is at most WIDEST
+    (1/4) of the motor's range. If the motor's `zone_ends_at_home` is set, a zone that would include the home position ends there.
     """
     low, high = robot.limits.T
     widest = np.minimum(width, WIDEST * (high - low))

@@ -20,7 +20,7 @@ from mobee.simulation.runner import Trace
 class PlantBatch:
     """Several offline plants of one model; the results of each are bit-equal to those of a separate `OfflinePlant`.
 
-    In all methods, `which` (k,) are the numbers of the plants concerned, each once.
+    In all methods, `which` (k,) are indices of `plants`, each at most once.
 
     Args:
         model: the robot in its world.
@@ -79,4 +79,4 @@ def _run_traced(plants: Sequence[OfflinePlant], ticks: int, threads: int) -> Arr
 
 
 def _deepest(trace: Trace) -> Array:
-    return np.array([trace.solid.max(), trace.field.max()])
+    return np.array([trace.solid.max(initial=0.0), trace.field.max(initial=0.0)])

@@ -36,9 +36,9 @@ class SlidingObject:
 
     The motion is quasi-static: friction with the surface stops the object at once when nothing pushes it, and its contacts with the robot
     have no friction. Such a disc moves along the normal of a contact, by the contact's depth, and does not rotate. It topples if it is
-    pushed above the height radius / friction, pressed from above, or wedged between solids; it falls if its centre leaves the area. A
-    fallen object is removed from the world for one second, and is then put back to its first place as soon as no part of the robot is
-    within 3 cm of this place. It exerts no force on the robot, and other objects do not stop it.
+    pushed higher than radius / friction above the surface, pressed from above, or wedged between solids; it falls if its centre leaves the
+    area. A fallen object is removed from the world for one second, and is then put back to its first place as soon as no part of the robot
+    is within 3 cm of this place. It exerts no force on the robot, and other objects do not stop it.
 
     Args:
         plant: the plant whose motion pushes the object; its callback (`every`) is used for this.
@@ -102,7 +102,10 @@ class SlidingObject:
         self._alone.move(self.name, position=first.position)
         if self._place is None:
             shape = Geometry(first.kind, first.size)
-            world.add(self.name, shape, position=first.position, rotation=first.rotation, role=first.role, color=first.color)
+            world.add(
+                self.name, shape, position=first.position, rotation=first.rotation, role=first.role, color=first.color,
+                mass=first.mass, friction=first.friction,
+            )  # fmt: skip
         else:
             world.move(self.name, position=first.position)
         self._place = first.position.copy()

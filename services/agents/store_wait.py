@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Makes an agent wait for its store: for room on the disk, without a time limit, and for the end of an earlier process of this agent."""
+"""Makes an agent wait for access to its file of transitions: until the disk has room, and until its earlier process has ended."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class StoreWait:
             else:
                 break
         if self.waits_for:
-            self._service.bus.event("info", "continues", f"the disk takes the data again after {time.monotonic() - begun:.0f} s")
+            self._service.bus.event("info", "continues", f"the store accepts the data again after {time.monotonic() - begun:.0f} s")
             self.waits_for = ""
         return result
 

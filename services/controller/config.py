@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from mobee.errors import InvalidValue
+from mobee.robot.motor_units import unit_name
 from mobee.robot.robot import Robot
 from services.common.config import ServiceConfig
 from services.controller.forces import load_terms
@@ -39,6 +40,7 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
             limits = robot.limits[robot.part(part).slice]
             if len(posture) != len(limits):
                 raise InvalidValue(f"posture of {part}: {len(posture)} numbers, it has {len(limits)} motors")
-            for motor, q, (lower, upper) in zip(robot.part(part).motors, posture, limits, strict=True):
+            for motor, q, (lower, upper) in zip(robot.motor_table[robot.part(part).slice], posture, limits, strict=True):
                 if not lower <= q <= upper:
-                    raise InvalidValue(f"posture of {part}: {motor} at {q:g} rad, its range is {lower:.4f} to {upper:.4f}")
+                    unit = unit_name(robot, motor)
+                    raise InvalidValue(f"posture of {part}: {motor.name} at {q:g} {unit}, its range is {lower:.4f} to {upper:.4f} {unit}")

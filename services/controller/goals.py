@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Answers the calls of agents: take and release a part's goal, set it, apply a force, reach; and lets attractors move."""
+"""Answers the calls of agents: take, release and set a part's goal, apply a force, reach; and moves attractors by `Follow` messages."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from mobee.arrays import Array
 from mobee.control.forces import LARGEST_FORCE
 from mobee.errors import InvalidValue, MobeeError
 from mobee.model.contact import links_moved
+from mobee.robot.motor_units import unit_name
 from mobee.robot.robot import Robot
 from services.common.service import CallRefused, Service
 from services.controller.action import Action, Owner
@@ -161,7 +162,9 @@ class GoalServer:
         if not len(outside):
             return ""
         i = int(outside[0])
-        return f"{self._robot.part(part).motors[i]} at {target[i]:.4f} rad: its range is {limits[i, 0]:.4f} to {limits[i, 1]:.4f} rad"
+        motor = self._robot.motor_table[self._robot.part(part).start + i]
+        unit = unit_name(self._robot, motor)
+        return f"{motor.name} at {target[i]:.4f} {unit}: its range is {limits[i, 0]:.4f} to {limits[i, 1]:.4f} {unit}"
 
     def _note_alive(self, who: str, instance: str, up: bool) -> None:
         for part, action in self._actions.items():

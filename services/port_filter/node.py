@@ -91,7 +91,7 @@ class FilterNode:
         state = self._switch.reflex.state
         if state == "stuck":
             accept = "if this pose is safe, accept it by the call rpc/waypoint of any part"
-            return f"{self._where()}, and there is no way back; {accept}"
+            return f"{self._where()}, and no motion back was found; {accept}"
         return "" if state == "forward" else f"the reflex moves the robot back ({state}): wait, then arm again"
 
     def _tick(self, tick: Tick) -> None:

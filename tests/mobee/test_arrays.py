@@ -11,6 +11,8 @@ from mobee.arrays import real_array
 from mobee.model.masses import gravity_torque, potential_energy
 from mobee.roadmap.playback import timed
 
+NO_NUMBERS, DATES = np.array(["1", 2], dtype=object), np.array(["2014-01-01"], dtype="datetime64[D]")
+
 
 def test_numbers_are_copied_as_floats() -> None:
     given = np.arange(6.0).reshape(2, 3).T
@@ -18,9 +20,10 @@ def test_numbers_are_copied_as_floats() -> None:
     value[0, 0] = 9.0
     assert (given[0, 0], value.flags.c_contiguous, value.shape) == (0.0, True, (3, 2))
     assert real_array("q", [1, True, np.float32(0.5)]).tolist() == [1.0, 1.0, 0.5]
+    assert real_array("q", np.array([1, 2.5], dtype=object)).tolist() == [1.0, 2.5]
 
 
-@pytest.mark.parametrize("given", ["home", [[1.0], [1.0, 2.0]], object(), [1.0, "a"], ["1", "2"], np.full((9, 1), "1")])
+@pytest.mark.parametrize("given", ["home", [[1.0], [1.0, 2.0]], object(), [1.0, "a"], ["1", "2"], np.full((9, 1), "1"), NO_NUMBERS, DATES])
 def test_an_argument_that_is_no_array_of_numbers_is_refused(given: Any) -> None:
     with pytest.raises(mobee.InvalidValue, match=r"^q is .*; it must be an array of numbers\.$"):
         real_array("q", given)

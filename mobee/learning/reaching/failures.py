@@ -25,10 +25,10 @@ MAX_CACHED = 256  # targets whose sums are in memory
 
 
 def midpoints(space: Space, reaches: Reaches) -> Array:
-    """Return the midpoint of each transition, shape (S A, 3 + d): the mean of its start and goal, for marker and joints.
+    """Return the midpoint of each transition: the mean of its start and goal, shape (S A, 3 + d), in row state * A + action.
 
-    The marker's position (3,) is in units of LENGTH_SCALE (0.08 m), the joints (d,) in units of JOINT_SCALE (0.4) times the spread of their
-    samples. For an action that does not exist the goal is the start.
+    The first 3 columns are the marker's position in units of LENGTH_SCALE (0.08 m). The last d are the joints, in units of JOINT_SCALE
+    (0.4) times the spread of their samples (largest minus smallest). For an action that does not exist the goal is the start.
     """
     goals = np.where(space.goals == NO_ACTION, np.arange(len(space))[:, None], space.goals)
     scaled = reaches.samples / np.maximum(np.ptp(reaches.samples, axis=0), 1e-9) / JOINT_SCALE
@@ -38,11 +38,12 @@ def midpoints(space: Space, reaches: Reaches) -> Array:
 
 
 class AlikeFailures:
-    """Rewards of transitions from failures with the same target, and from failures of similar transitions with other targets.
+    """A memory of failed transitions: a reward depends on failures with the same target, and of similar transitions with other targets.
 
     A transition that was tried with this target has the average of its rewards and of one imagined reward of 0. Any other transition has a
-    negative reward if similar transitions failed more often than all transitions on average. This reward is at least -MAX_COST (-0.4):
-    large enough that plans avoid the transition if another path costs little, and too small to exclude a state that was never tried.
+    negative reward if similar transitions failed more often than all transitions on average. Two transitions are similar if their joints,
+    and their vectors from hand to target, are similar. This reward is at least -MAX_COST (-0.4): large enough that plans avoid the
+    transition if another path costs little, and too small to exclude a state that was never tried.
 
     Args:
         space: states and transitions.
@@ -120,7 +121,7 @@ NEAR_DISTANCE = 0.025  # m, between targets of the published size that block nea
 
 
 class Failures:
-    """Rewards of transitions from their histories: for each target, 0 for every success and a penalty for every failure.
+    """A memory of failed transitions: the reward of a transition is an average of 0 for each success and a penalty for each failure.
 
     Args:
         states, actions: number of states, and largest number of actions of a state.
@@ -165,7 +166,8 @@ class FailuresSinceChange:
     Before the first change it returns the rewards of the memory `usual`. A failure in contact with the target is always attributed to the
     target. Any other failure since the last change counts for all targets: the reward of its transition is the average of its rewards and
     of one imagined reward of 0. Transitions that were not tried since the change have a reward from the failures of similar transitions, as
-    in `AlikeFailures`; similar means similar joints and position of the hand in the root frame.
+    in `AlikeFailures`; similar means similar joints and position of the hand in the root frame. The lower one of this reward and that of
+    `usual` counts.
 
     Args:
         space: states and transitions.
@@ -192,17 +194,14 @@ class FailuresSinceChange:
 
     def change(self, transitions: int) -> None:
         """Record that the world changed before the last `transitions` transitions; transitions that touched the target are not counted."""
-        self._since = self._since[len(self._since) - transitions :]
+        self._since = self._since[max(0, len(self._since) - transitions) :]
         self._changed = True
         self._clear()
         for one in self._since:
             self._learn(*one)
 
     def blocked(self, state: int, action: int) -> float:
-        """Return the probability that the world, since its change, blocks a transition; 0 before the first change.
-
-        The transition is that by `action` from `state`.
-        """
+        """Return the probability that the world, since its change, blocks the transition by `action` from `state`; 0 before any change."""
         if not self._changed:
             return 0.0
         transition = state * self._shape[1] + action
@@ -256,7 +255,7 @@ def by_target(touched: tuple[str, ...]) -> bool:
 
 
 def failures_of(space: Space, reaches: Reaches, kind: str) -> Failures | AlikeFailures:
-    """Make a memory of failures without any failure: "spread" or "local", a `Failures`, or "alike", an `AlikeFailures`.
+    """Make an empty memory of failures: for the kind "spread" or "local" a `Failures`, for "alike" an `AlikeFailures`.
 
     Raises UnknownName if there is no such kind.
     """

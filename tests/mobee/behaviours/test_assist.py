@@ -17,6 +17,7 @@ from mobee.model.world_file import load_world
 from mobee.reach import ReachTarget
 from mobee.robot.load import load_robot
 from mobee.simulation import OfflinePlant
+from tests.mobee.planar import planar_arm
 
 ROBOT = load_robot("icub")
 TORSO = ROBOT.part("torso").slice
@@ -88,3 +89,8 @@ def test_the_map_of_a_reach_learner_is_the_best_that_it_predicts() -> None:
 def test_a_part_that_does_not_carry_the_arm_is_refused() -> None:
     with pytest.raises(InvalidValue, match="head of 'icub' does not carry right_arm"):
         Assist(Model(ROBOT), "head", "right_arm", lambda places: np.zeros(len(places)))
+
+
+def test_an_arm_that_moves_in_a_plane_has_no_manipulability() -> None:
+    with pytest.raises(InvalidValue, match="arm cannot move tip in three directions"):
+        manipulability_worth(planar_arm(), "arm", "tip")

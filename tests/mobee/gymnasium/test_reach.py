@@ -95,6 +95,8 @@ def test_a_vector_begins_with_the_goals_of_its_options() -> None:
     vector = gymnasium.make_vec("MoBeE/Reach-v0", num_envs=2, period=0.02)
     goals = np.array([[-0.3, 0.1, 0.1], [-0.2, 0.2, 0.0]])
     assert vector.reset(seed=0, options={"goal": goals})[0]["desired_goal"].tolist() == goals.tolist()
+    with pytest.raises(gymnasium.error.Error, match="python integer"):
+        vector.reset(seed=np.int64(3))  # type: ignore[arg-type]
     assert vector.reset(seed=0, options={"goal": goals[1]})[0]["desired_goal"].tolist() == goals[[1, 1]].tolist()
     with pytest.raises(InvalidValue, match=r"goal: \[0.0, 1.0\] is not a position"):
         vector.reset(options={"goal": [0.0, 1.0]})

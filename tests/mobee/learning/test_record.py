@@ -9,6 +9,7 @@ import pytest
 
 from mobee.errors import InvalidValue, MobeeError, UnknownName
 from mobee.learning.agent import CuriousAgent
+from mobee.learning.discrete import DiscreteSpace
 from mobee.learning.lattice import Lattice
 from mobee.learning.record import load_learned, space_from
 from mobee.learning.space import Space
@@ -59,6 +60,7 @@ def test_a_record_that_gives_another_space_now_is_refused():
         ({}, "not of a space"),
         ([], "not the record of a space"),
         (torso().settings | {"kind": "circle"}, "kind 'circle'"),
+        (DiscreteSpace(3, 2).settings, "DiscreteSpace"),
         (torso().settings | {"robot": "katana"}, "of robot 'katana'"),
     ],
 )

@@ -86,3 +86,12 @@ def test_a_plant_that_is_lost_takes_nothing_from_the_others(forced: bool) -> Non
     assert isinstance(results[1], ActionInterrupted) and results[0].tolist() == results[2].tolist() == [0.0, 0.0]
     assert [plant.time for plant in batch.plants] == pytest.approx([0.14, 0.04, 0.14])
     assert batch.run(np.array([], dtype=np.intp), 5).shape == (0, 2)
+
+
+@pytest.mark.parametrize("forced", [False, True])
+def test_no_ticks_have_no_depths(forced: bool) -> None:
+    """Also of plants that need Python between ticks."""
+    batch = PlantBatch(Model(ICUB, load_world("table")), 2, SETTINGS)
+    if forced:
+        batch.plants[1].each_tick = lambda plant: None
+    assert batch.run(np.arange(2), 0).tolist() == [[0.0, 0.0], [0.0, 0.0]]

@@ -25,7 +25,7 @@ def stage(
 ) -> tuple[OfflinePlant, SlidingObject]:
     world = World()
     world.add("table", box(2.4, 2.4, 0.3), position=(0.0, 0.0, TOP - 0.15), role="ghost")
-    world.add("cup", cylinder(CUP, height), position=(*place, TOP + height / 2), role=ghost)  # type: ignore[arg-type]
+    world.add("cup", cylinder(CUP, height), position=(*place, TOP + height / 2), role=ghost, mass=0.2, friction=0.7)  # type: ignore[arg-type]
     plant = OfflinePlant(Model(two_part_arm(), world), motors=MotorParameters.ideal(), contact_forces=False)
     return plant, SlidingObject(plant, "cup", **({"friction": 0.3} | options))
 
@@ -91,7 +91,8 @@ def test_it_falls_and_is_put_back_when_its_first_place_is_free(options: dict[str
     assert cup.place is None and not cup.put_back()  # the arm lies over its place
     plant.act("trunk", np.array([0.3]))
     assert cup.place is not None and cup.place[:2].tolist() == list(place)
-    assert plant.model.world.objects["cup"].role == "ghost"
+    thing = plant.model.world.objects["cup"]
+    assert (thing.role, thing.mass, thing.friction) == ("ghost", 0.2, 0.7)
 
 
 def test_it_falls_where_it_is_pressed_from_above() -> None:

@@ -219,7 +219,7 @@ def test_a_robot_that_starts_in_contact_moves_when_a_client_accepts_the_pose(cli
     direct.go(PITCH, 10.0)
     direct.call(keys.drive("torso", "release"), WithEpoch, Driven, epoch=direct.epoch)
     mine = client(FILTERED)
-    with pytest.raises(CallFailed, match="table .* no way back.* rpc/waypoint"):
+    with pytest.raises(CallFailed, match="table .* no motion back.* rpc/waypoint"):
         mine.arm()
     for _ in range(TRIES):
         mine.answer()

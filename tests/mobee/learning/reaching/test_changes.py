@@ -56,6 +56,14 @@ def test_the_scale_of_rewards_comes_from_repeats():
     assert scale.repeated(3, HERE) and not scale.repeated(3, THERE)
 
 
+def test_a_change_before_the_first_transition_keeps_all_of_them():
+    failures = FailuresSinceChange(SPACE, REACHES, failures_of(SPACE, REACHES, "alike"))
+    for state in range(3):
+        failures.add(state, 0, HERE, -10.0, ())
+    failures.change(5)
+    assert min(failures.blocked(state, 0) for state in range(3)) > 0.5
+
+
 def test_failures_without_the_target_count_for_all_targets_after_a_change():
     usual = failures_of(SPACE, REACHES, "alike")
     failures = FailuresSinceChange(SPACE, REACHES, failures_of(SPACE, REACHES, "alike"))
