@@ -32,15 +32,17 @@ class Rights:
     """What one identity may do on the bus, as key expressions without the namespace; everything else is denied.
 
     `writes`, `reads`: keys of streams that it may publish and subscribe to. `calls`, `answers`: keys of calls that it may make and answer.
+    `tokens`: liveliness tokens that it may declare; every identity may read all tokens. `keeps`: streams among `writes` whose past messages
+    it sends to late readers. `catches_up`: streams among `reads` whose past messages it may request.
     """
 
     writes: tuple[str, ...]
     reads: tuple[str, ...]
     calls: tuple[str, ...]
     answers: tuple[str, ...]
-    tokens: tuple[str, ...]  # liveliness tokens that it may declare; every identity may read all tokens
-    keeps: tuple[str, ...]  # streams among `writes` whose past messages it sends to late readers
-    catches_up: tuple[str, ...]  # streams among `reads` whose past messages it may request
+    tokens: tuple[str, ...]
+    keeps: tuple[str, ...]
+    catches_up: tuple[str, ...]
 
 
 def party_of(name: str) -> Party:
@@ -62,8 +64,9 @@ def party_of(name: str) -> Party:
 def may_call(who: str, key: str) -> bool:
     """Return whether the table of calls (`bus_schema.rpc.CALLS`) lets the process `who` make the call `key`.
 
-    The result is always True for operators, clients, observers and drivers, because these programs choose their names themselves; and an
-    agent may name any part. In a secured system the router, which knows the identity of each process, restricts both.
+    The result is always True for operators, clients, observers and drivers, because these programs choose their names themselves. For an
+    agent, the part in the key is not checked. In a secured system the router, which knows the identity of each process, is stricter in both
+    cases.
     """
     party = party_of(who)
     allowed = _expressions(_patterns("callers", party), ("*",), "*")

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Keys of calls and of liveliness tokens, as functions; the keys of streams are in the messages (`Message.stream`).
 
-The robot's name is the namespace of the session, so it is not part of them.
+The keys do not contain the robot's name, because it is the namespace of the session.
 """
 
 from __future__ import annotations
@@ -35,9 +35,10 @@ def goal(part: str, verb: str) -> str:
 
 
 def waypoint(part: str) -> str:
-    """Return the key of the call that marks the present pose as a waypoint, to which the port filter may later move the robot back.
+    """Return the key of the call that marks the newest safe pose as a waypoint, to which the port filter may later move the robot back.
 
-    `part`: name of the part; * means all parts.
+    If the port filter has found no motion back, the call accepts the present pose as safe. `part`: name of any part, since the call
+    concerns the whole robot; * means all parts.
     """
     return f"{_part_or_all(part)}/rpc/waypoint"
 
@@ -55,7 +56,8 @@ def world_rpc(verb: str) -> str:
 def service_rpc(who: str, verb: str) -> str:
     """Return the key of a call to the service `who`.
 
-    `verb`: every service answers stat, pulse, mark, config and shutdown; an agent also answers rest, resume and explore.
+    `verb`: every service answers stat, pulse, mark (set the counters to 0), config and shutdown; an agent also answers rest (release its
+    part), resume and explore.
     """
     return f"{chunk(who)}/rpc/{chunk(verb)}"
 

@@ -71,7 +71,7 @@ class Clock(Message, frozen=True, kw_only=True):
 
 
 class PartStatus(Struct, frozen=True, forbid_unknown_fields=True):
-    """Sampling time of a part, state of its gate, and command that its motors follow; the fields have the same meaning as in `State`."""
+    """Status of one part in `Tick`: its sampling time, the state of its gate, and the command that its motors follow; as in `State`."""
 
     k: Count  # tick in which the part was sampled
     t: Count  # ns, bus clock, time of the sample
@@ -99,7 +99,7 @@ class Tick(Clock, frozen=True, kw_only=True):
 
 
 class StepDone(Message, frozen=True, kw_only=True):
-    """Answer of a participant to a tick in lockstep: it has published all its messages for tick re_k."""
+    """Answer of a participant (a process for which each tick waits) in lockstep: it has published all its messages for tick re_k."""
 
     stream: ClassVar[Stream] = Stream("done/{service}", "STEP", writers=PARTICIPANTS, readers=("robot_sim",), when="in lockstep")
 
@@ -111,7 +111,7 @@ class StepDone(Message, frozen=True, kw_only=True):
 
 
 class Turn(Message, frozen=True, kw_only=True):
-    """Message to one participant in lockstep (the name in the key): tick k waits for the answer of this participant.
+    """Message to one participant in lockstep, which the key names: tick k waits for the answer of this participant.
 
     The tick waits because the participant may have an action to decide.
     """
@@ -122,7 +122,7 @@ class Turn(Message, frozen=True, kw_only=True):
 
 
 class State(Message, frozen=True, kw_only=True):
-    """Measured state of the motors of one part, and the state of its gate, at the part's own sampling time t."""
+    """Measured state of the motors of one part, and of its gate (the check of its commands), at the part's own sampling time t."""
 
     stream: ClassVar[Stream] = Stream(
         "{part}/state",
@@ -162,7 +162,7 @@ class Command(Message, frozen=True, kw_only=True):
 
 
 class Order(Struct, frozen=True, forbid_unknown_fields=True):
-    """Command to one part in `Commands`, without the reference: number of the sender's ownership (epoch), and kind of command."""
+    """Command to one part in `Commands`: the sender's ownership (epoch) and the kind of command; the reference is in `Commands.ref`."""
 
     epoch: Count  # drive epoch of the sender, as in `Taken`
     mode: Mode  # kind of command
@@ -189,7 +189,7 @@ class Commands(Message, frozen=True, kw_only=True):
 
 
 class Motion(Message, frozen=True, kw_only=True):
-    """State of a part and of its action, as the controller measures and commands it."""
+    """State of a part and of its newest action: measured positions, commanded velocity and acceleration, attractor, contacts."""
 
     stream: ClassVar[Stream] = Stream(
         "{part}/motion",
@@ -213,7 +213,7 @@ class Motion(Message, frozen=True, kw_only=True):
 
 
 class Follow(Message, frozen=True, kw_only=True):
-    """A moving attractor, the posture to which a part moves. If no message comes for 0.1 s, the controller assumes it to be at rest."""
+    """A moving attractor, the posture to which a part moves. Without a message for 0.1 s, the controller assumes the attractor to rest."""
 
     stream: ClassVar[Stream] = Stream(
         "{part}/follow",
@@ -288,7 +288,7 @@ class Targets(Message, frozen=True, kw_only=True):
 
 
 class MarkerPose(Struct, frozen=True, forbid_unknown_fields=True):
-    """Position and orientation of a marker, which is a named point on a link, in the root frame."""
+    """Position and orientation, in the root frame, of a marker, which is a named point on a link."""
 
     name: Name
     position: Vector3  # m
@@ -319,7 +319,7 @@ class ContactItem(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Forces(Message, frozen=True, kw_only=True):
-    """Forces of the control law at tick re_k. Each term of the law is one force on all motors.
+    """Forces of the control law at tick re_k: for each term of the law, its force on every motor.
 
     The model publishes the constraint forces (thesis eqs. 5.11-5.17), the controller the user-defined terms.
     """
@@ -402,7 +402,7 @@ class Image(Message, frozen=True, kw_only=True):
 
 
 class Camera(Message, frozen=True, kw_only=True):
-    """Properties of a camera's lens, and the encoder values of the robot at the time t of the picture."""
+    """Data for one `Image`: properties of the camera's lens, exposure, and the robot's encoder values at the time t of the picture."""
 
     stream: ClassVar[Stream] = Stream(
         "vision/camera/{camera}", "BULK", writers=("renderer",), readers=("vision",), when="with each picture"
@@ -461,7 +461,7 @@ class Decision(Message, frozen=True, kw_only=True):
 
 
 class Surprise(Struct, frozen=True, forbid_unknown_fields=True):
-    """An outcome of an action that differs from its goal."""
+    """A state, other than the action's goal, in which some tries of an action ended, and the share of these tries; part of `Learned`."""
 
     s: Count  # state before the action
     a: Count  # number of the action in that state

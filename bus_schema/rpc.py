@@ -25,13 +25,16 @@ class Empty(Request, frozen=True, kw_only=True):
 
 
 class Take(Request, frozen=True, kw_only=True):
-    """Take the ownership of a part's drive or goal. The ownership ends when the caller's liveliness token disappears."""
+    """Take the ownership of a part's drive (right to command its motors) or goal (right to set its attractor), as the key says.
+
+    The ownership also ends when the caller's liveliness token, by which others see that the caller runs, disappears.
+    """
 
     instance: Name  # last chunk of the caller's liveliness token `alive/{service}/{instance}`
 
 
 class WithEpoch(Request, frozen=True, kw_only=True):
-    """A call that only the owner of the part's drive or goal may make; the key says which call it is."""
+    """The request of `drive/arm`, `drive/release`, `drive/hold` and `release`, which only the owner of the drive or goal may call."""
 
     epoch: Count  # epoch of the caller's ownership, as in `Taken`
 
@@ -48,7 +51,7 @@ class Force(Request, frozen=True, kw_only=True):
     """Apply a client's force to a part until it is cleared.
 
     The force acts in joint space (`f`, thesis eq. 5.9), at a marker (`marker` and `push`, eq. 5.10), or both. A request with neither clears
-    all forces of the part's client.
+    all forces that were set for the part.
     """
 
     epoch: Count  # goal epoch of the caller, as in `Taken`
@@ -143,29 +146,29 @@ class Reply(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class Done(Reply, frozen=True, kw_only=True):
-    """The call succeeded."""
+    """Reply to a call that succeeded and has no result."""
 
 
 class Taken(Reply, frozen=True, kw_only=True):
-    """The epoch of the new ownership; calls and commands with an older epoch are refused."""
+    """Reply to `Take`: the number (epoch) of the new ownership; calls and commands with an older epoch are refused."""
 
     epoch: Count
 
 
 class Driven(Reply, frozen=True, kw_only=True):
-    """State of the part's gate after the call."""
+    """Reply to the calls `drive/arm`, `drive/release` and `drive/hold`: state of the part's gate (the check of its commands) afterwards."""
 
     gate: GateState
 
 
 class Started(Reply, frozen=True, kw_only=True):
-    """An action began at tick k; `Motion` of later ticks reports its state."""
+    """Reply to `Goal` and `ReachFor`: the action began at tick k; `Motion` of later ticks reports its state."""
 
     k: Count
 
 
 class PartMeta(Reply, frozen=True, kw_only=True):
-    """Motors of a part and their limits."""
+    """Reply to the call `{part}/meta`: motors of a part and their limits."""
 
     part: Name
     motors: list[Name]
@@ -179,7 +182,7 @@ class PartMeta(Reply, frozen=True, kw_only=True):
 
 
 class ObjectState(Struct, frozen=True, forbid_unknown_fields=True):
-    """An object of the model's world."""
+    """An object of the model's world, in the reply `World`."""
 
     name: Name
     geometry: Geometry
@@ -192,14 +195,14 @@ class ObjectState(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class World(Reply, frozen=True, kw_only=True):
-    """All objects of the model's world."""
+    """Reply to the call `model/rpc/world/list`: all objects of the model's world."""
 
     objects: list[ObjectState]
     stale: dict[Name, float] = {}  # perceived objects that were removed because they are not seen any more: s since the last picture
 
 
 class JacobianReply(Reply, frozen=True, kw_only=True):
-    """A Jacobian, root frame: rows linear [m/rad], then angular; one column for each of the robot's motors."""
+    """Reply to `JacobianAt`: a Jacobian, root frame: 3 linear rows [m/rad], then 3 angular ones; one column for each motor of the robot."""
 
     rows: Annotated[int, Meta(ge=1)]
     columns: Annotated[int, Meta(ge=1)]
@@ -223,14 +226,14 @@ class Stat(Reply, frozen=True, kw_only=True):
 
 
 class Pulse(Reply, frozen=True, kw_only=True):
-    """Numbers that show whether a service still handles messages; the service replies also while a handler runs."""
+    """Reply to the call `pulse`: numbers that show whether a service still handles messages; it is sent also while a handler runs."""
 
     handled: int  # messages, calls and timers since the start
     waiting: int  # messages and calls in the inbox
 
 
 class Config(Reply, frozen=True, kw_only=True):
-    """A service's whole configuration as JSON."""
+    """Reply to the call `config`: a service's whole configuration as JSON."""
 
     config: str  # JSON
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Opens the SQLite file of a run and translates its errors into one line."""
+"""Opens the SQLite file of a run, and converts SQLite errors into MobeeErrors with a message of one line."""
 
 from __future__ import annotations
 

@@ -53,7 +53,7 @@ class InUse(MobeeError):
 
 
 class ActionInterrupted(MobeeError):
-    """Raised if an action ends without an outcome (hold, fault, or a new run of the robot); agents do not learn from it."""
+    """Raised if an action ends without an outcome, by a hold (a safe stop), a fault or a restart of the robot; no agent learns from it."""
 
 
 class BatchInterrupted(ActionInterrupted):

@@ -45,14 +45,14 @@ class Plant(Protocol):
     def act(self, part: str, target: Array) -> Outcome:
         """Set the part's attractor to `target` (n_part,) rad and wait until the part has settled, or a time limit is over (thesis 6.1).
 
-        Raises ActionInterrupted if the action ends without an outcome: by a hold, a fault or a new run of the robot.
+        Raises ActionInterrupted if the action ends without an outcome: by a hold (a safe stop), a fault or a restart of the robot.
         """
         ...
 
 
 @runtime_checkable
 class Described(Protocol):
-    """A plant with settings that can be recorded; an agent continues a record only on a plant of equal settings."""
+    """A plant whose settings are recorded with an agent's transitions, so that the agent continues them only with equal settings."""
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -100,8 +100,9 @@ class PerceivingPlant:
     def act(self, part: str, target: Array) -> Outcome:
         """Set the part's attractor, wait until the part has settled or a time limit is over, and return the outcome.
 
-        The outcome has also the objects that are perceived at the end of the action. `target`: (n_part,) rad, the attractor of the part's
-        motors. Raises ActionInterrupted if the action ends without an outcome: by a hold, a fault or a new run of the robot.
+        The outcome includes the positions of the objects that are perceived at the end of the action. `target`: (n_part,) rad, the
+        attractor of the part's motors. Raises ActionInterrupted if the action ends without an outcome: by a hold (a safe stop), a fault or
+        a restart of the robot.
         """
         return replace(self.plant.act(part, target), perceived=self.perceive())
 

@@ -96,8 +96,8 @@ class ReachPlant(Plant, Protocol):
 
         Meanwhile the attractor stays at the target of the part's last action; when the force has ended, it pulls the part back.  `stay`:
         True: the attractor moves to the pose in which the force ended, so that the part stays there; `after` is then the outcome there.
-        Raises InvalidValue if no target is presented or the part does not move the marker; ActionInterrupted on a hold, a fault or a new
-        run.
+        Raises InvalidValue if no target is presented or the part does not move the marker; ActionInterrupted on a hold (a safe stop), a
+        fault or a restart of the robot.
         """
         ...
 

@@ -48,8 +48,8 @@ class Range:
 class Settings:
     """The base class of the settings of an agent or a plant: a subclass states each field once, with its type, default and meaning.
 
-    Three things are made from these fields: the signature of the constructor that takes the settings (`mobee.settings.accepts`), the
-    fields of a scenario file (`services.agents.config`) and the record of a run.  Values are checked against `Range` and `Literal`
+    From these fields come the signature of the constructor that takes the settings (`mobee.settings.accepts`), the fields of a scenario
+    file (`services.agents.config`) and the settings that are recorded with a run.  Values are checked against `Range` and `Literal`
     annotations.  A field for a function or class can be set by its short name, by `module:name`, or by the function or class itself
     (`mobee.settings.named`).
 
@@ -81,7 +81,7 @@ def hints_of(settings: type[Settings]) -> dict[str, Any]:
 
 
 def accepts(settings: type[Settings]) -> Callable[[C], C]:
-    """Return a decorator for a constructor that ends in `**changes`: `inspect.signature` and `help` then list the fields of `settings`."""
+    """Return a decorator for a constructor whose last argument is `**changes`: `help` on it then lists the fields of `settings`."""
 
     def decorate(constructor: C) -> C:
         own = inspect.signature(constructor)
@@ -102,7 +102,7 @@ def accepts(settings: type[Settings]) -> Callable[[C], C]:
 
 
 def named(kind: str, given: str | T, table: Mapping[str, T]) -> tuple[str, T]:
-    """Return the name under which a function or class is recorded, and the function or class itself.
+    """Return the name under which a function or class is recorded in the settings of a run, and the function or class itself.
 
     Args:
         kind: what is named, for the messages: "explorer", "strategy".
@@ -111,7 +111,7 @@ def named(kind: str, given: str | T, table: Mapping[str, T]) -> tuple[str, T]:
         table: the functions and classes that have a short name, by this name.
 
     Raises:
-        UnknownName: the table has no such name.
+        UnknownName: `given` is neither a name in the table nor of the form `module:name`.
         InvalidValue: the object cannot be imported, or it cannot be called.
     """
     if isinstance(given, str):

@@ -26,7 +26,11 @@ MANY = 128  # contacts for which a new room has space
 
 
 class Handle:
-    """The owner of an object of the core, which is freed together with this object; `at`: the memory address of the core's object."""
+    """The owner of an object of the core: it frees the core's object when it is deleted itself.
+
+    `at`: memory address of the core's object. `free`: function that frees it, given the address. `kept`: an object that must live as long,
+    because the core's object refers to its memory.
+    """
 
     __slots__ = ("__weakref__", "_free", "_kept", "at")
 
@@ -175,7 +179,7 @@ class Room:
     """Buffers in which the core evaluates poses, for one thread at a time; they are reused, because allocation takes longer than one pose.
 
     `rows`: buffer into which `evaluate_one` writes at most `most` contacts. `torque`: buffer for the projection of the contacts to the
-    motors, (n,) m^2/rad. `asked`: the first argument of `evaluate_one`.
+    motors, (n,) m^2/rad. `asked`: the first argument of the compiled function `evaluate_one`.
     """
 
     __slots__ = ("_at", "_handle", "_request", "asked", "most", "rows", "torque")
@@ -195,9 +199,10 @@ class Room:
 
         The contacts are two arrays: numbers (c, 6) and reals (c, 7), the columns of `mobee.model.contact.ContactTable`. The projection is
         the sum of J^T (depth * normal) over the contacts of fields, volumes that cause repulsive forces; J is the Jacobian of the contact's
-        point. `scene`: handle of the scene. `hands`: the reaching hands as four link indices (`mobee.model.snapshot.hand_numbers`); their
-        contacts with targets are ignored. `cut`: True: a contact acts only on the motors of the part that touches, as in the MoBeE program
-        of 2014; False: also on the motors nearer to the base. `threads`: number of threads.
+        point. `scene`: handle of the scene. `hands`: up to two reaching hands as four link indices, two for each hand, as
+        `mobee.model.snapshot.hand_numbers` returns them; their contacts with targets are ignored. `cut`: True: a contact acts only on the
+        motors of the part that touches, as in the MoBeE program of 2014; False: also on the motors nearer to the base. `threads`: number of
+        threads.
         """
         torque = np.empty(q.shape)
         request = _Request(scene.at, address(q), address(torque), len(q), cut, threads, (INTEGER * 4)(*hands))
@@ -207,8 +212,9 @@ class Room:
     def ask(self, scene: Handle, hands: Sequence[int], cut: bool) -> None:
         """Set the scene, the reaching hands and `cut` for the next calls of `evaluate_one`.
 
-        `scene`: handle of the scene; the caller keeps it alive. `hands`: four link indices (`mobee.model.snapshot.hand_numbers`); contacts
-        of these hands with targets are ignored. `cut`: whether a contact acts only on the motors of its own part.
+        `scene`: handle of the scene; the caller keeps it alive. `hands`: up to two hands as four link indices, two for each hand, as
+        `mobee.model.snapshot.hand_numbers` returns them; their contacts with targets are ignored. `cut`: True: a contact acts only on the
+        motors of the part that touches.
         """
         self._request.scene, self._request.hands[:], self._request.cut = scene.at, hands, cut
 
@@ -222,8 +228,8 @@ class Following:
     """A neighbour list of a robot in a scene: the pairs of volumes that are near each other in consecutive poses; for one thread at a time.
 
     `skin`: m; pairs nearer than this are in the list, which is made again when two volumes may have approached each other by the skin.
-    `cut`: whether a contact acts only on the motors of its own part. `at`: address of the list in the core, which a plant of the core uses;
-    it is valid after `enter`, while this object exists.
+    `cut`: True: a contact acts only on the motors of the part that touches. `at`: address of the list in the core, which a plant of the
+    core uses; it is valid after `enter`, while this object exists.
     """
 
     def __init__(self, skin: float, cut: bool) -> None:
@@ -234,8 +240,8 @@ class Following:
     def enter(self, scene: Handle, hands: Sequence[int]) -> None:
         """Set the scene and the reaching hands for the next poses.
 
-        `scene`: handle of the scene, which is kept alive. `hands`: four link indices (`mobee.model.snapshot.hand_numbers`); contacts of
-        these hands with targets are ignored.
+        `scene`: handle of the scene, which is kept alive. `hands`: up to two hands as four link indices, two for each hand, as
+        `mobee.model.snapshot.hand_numbers` returns them; their contacts with targets are ignored.
         """
         self._scene = scene  # before the core releases the last one, which has no other user
         numbers = (INTEGER * 4)(*hands)
@@ -255,8 +261,8 @@ class Following:
     def state(self) -> tuple[int, int, int]:
         """Return three numbers, for tests: the state of the list, the number of pairs in it, and the number of poses for which it was used.
 
-        States: 0: the list is empty; 1: only the last pose is stored; 2: the pairs are stored; 3: only the last pose is stored, because the
-        list became outdated.
+        States: 0: nothing is stored; 1: only the last pose is stored; 2: the list is stored; 3: as 1, since the world changed while a list
+        was in use.
         """
         found = np.empty(3, dtype=np.int64)
         _neighbours_state(self.at, address(found))
@@ -274,8 +280,9 @@ def sines_cosines(angles: Array) -> tuple[Array, Array]:
 def swung(of: Handle, then: Array, now: Array, shapes: int) -> Array:
     """Return upper bounds (S, L) m of the motion of each shape between two poses, for tests.
 
-    Column k is the motion as seen from the link that carries both the shape and link k. `of`: handle of the robot. `then`, `now`: (J,)
-    joint positions [rad or m]. `shapes`: the number S of shapes.
+    Rows are shapes, in the order of the robot's tables. Column k bounds the motion relative to the common ancestor of the shape's link and
+    link k: the last link that carries both. `of`: handle of the robot. `then`, `now`: (J,) rad or m, positions of all joints in the two
+    poses. `shapes`: the number S of shapes.
     """
     out = np.empty((shapes, len(then) + 1))
     _swung(of.at, address(then), address(now), address(out))
@@ -295,9 +302,9 @@ def place(of: Handle, q: Array, shapes: int) -> NDArray[Any]:
 class Grid(NamedTuple):
     """The grid of cells by which the compiled core sorts the free world objects of a scene to find contacts.
 
-    `large`: number of large objects, which come first and are in no cell. `cells`: number of cells along x, y and z. `starts`: (cells + 1,)
-    first object of each cell. `objects`: (N, 2), index of each object in the world, and 1 if it is a target, else 0. `centers`: (N, 3) m,
-    of these objects, root frame.
+    `large`: number of large objects, which are in no cell. `cells`: number of cells along x, y and z. `objects`: (N, 2), the large objects
+    first, then those of each cell: index in the world, and 1 for a target, else 0. `starts`: (number of cells + 1,) row of `objects` at
+    which each cell begins, and the end. `centers`: (N, 3) m, root frame, of the objects in the rows of `objects`.
     """
 
     large: int

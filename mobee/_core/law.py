@@ -29,13 +29,13 @@ MODALITIES = ("position", "velocity", "torque")
 
 
 class Settle(ctypes.Structure):
-    """The thresholds and times of the settle test, as the core has them (`mobee.control.gains`): speed, acceleration, and times [s]."""
+    """The thresholds and times of the settle test in the form of the core; `mobee.control.gains.Settle` explains the fields."""
 
     _fields_ = tuple((name, REAL) for name in SETTLE)
 
 
 class SettleTest(ctypes.Structure):
-    """The state of a settle test: the start of the action and the time of the next check [s]."""
+    """The state of the settle test of one action: the times [s] at which the action started and at which it is checked next."""
 
     _fields_ = (("start", REAL), ("next_check", REAL))
 

@@ -59,11 +59,11 @@ finite.
 
 
 class DebiasedCounts(ctypes.Structure):
-    """The structure `DebiasedCounts` of core/observations.cpp: probabilities from real outcomes and a weak prior.
+    """The structure `DebiasedCounts` of core/observations.cpp: outcome probabilities from real counts and a weak prior.
 
-    They do not contain the imagined outcomes (pseudo-counts from before the first try). The structure keeps the arrays to which it points
-    alive. `probabilities`: (S, A, B), which `believe` computes. `prior` (B,): the prior's weight of each bin; `total`: the sum of the
-    prior. `at`: address of the structure.
+    The imagined counts of thesis Algorithms 6 and 8 do not enter the probabilities. `probabilities`: (S, A, B), for each state-action the
+    probability of each of B bins; the function `believe` of this module updates them. `prior` (B,): the prior's count of each bin.
+    `total`: the sum of the prior. `at`: address of the structure, which keeps its arrays alive.
     """
 
     _fields_ = (("probability", ADDRESS), ("prior", ADDRESS), ("sum", REAL))
@@ -77,10 +77,10 @@ class DebiasedCounts(ctypes.Structure):
 class OutcomeCounts(ctypes.Structure):
     """The counts of a transition model for the core, `OutcomeCounts` of core/observations.cpp; observations write into its arrays.
 
-    It keeps the arrays to which it points alive. `arrays`: the arrays by the name of the structure's field, such as "count" (S, A, B).
-    `over_states`: 0: the reward is computed over the outcomes of the state-action; above 0: over this number of states, each with one count
-    before the first observation. `forgetting`: factor by which earlier real counts are multiplied at each observation. `at`: address of the
-    structure. The indices of states, actions and outcomes are not checked.
+    `arrays`: the arrays by the name of the structure's field, such as "count" (S, A, B); they are kept alive. `over_states`: 0: the reward
+    is computed over the outcomes of the state-action; above 0: over this number of states, each with one count before the first
+    observation. `forgetting`: factor by which the earlier real counts of a state-action are multiplied at each of its observations. `at`:
+    address of the structure. Functions of the core do not check the indices of states, actions and outcomes.
     """
 
     _fields_ = (
@@ -137,7 +137,8 @@ def deplete(table: TransitionTable, counts: Array, totals: Array, action_values:
     """Simulate the next `steps` best actions from a state, each with its most likely outcome, and reduce the gains of these actions.
 
     `gains` (S, A), nats, changes in place: each gain is reduced as an observation of that outcome would reduce it. `counts` (S, A, B),
-    `totals` (S, A): the counts of the outcomes, and their sums over the bins. `action_values` (S, A): -inf if there is no such action.
+    `totals` (S, A): the counts of the outcomes, and their sums over the bins. `action_values` (S, A): the best action of a state has the
+    largest value; -inf if there is no such action.
     """
     following = _NextCounts(address(counts), address(totals))
     _deplete(table.at, ctypes.addressof(following), address(action_values), state, steps, address(gains))
@@ -160,12 +161,13 @@ _gaussian_sums = function("gaussian_sums", ADDRESS, INTEGER, INTEGER, ADDRESS, I
 def weighted_sums(
     targets: Array, keys: Ints, sums: Array, sizes: tuple[int, int], weighing: tuple[float, float], target: Array, out: Array
 ) -> None:
-    """Sum the recorded values of each action, weighted by the distances of the recorded targets from `target` (3,) m.
+    """Add up the recorded values of each action, weighted by the distances of the recorded targets from `target` (3,) m.
 
-    `out` (2, actions): the sums of the weighted values, and the sums of the weights, are added to it. The record has `sizes[0]` targets, in
-    the first rows of `targets` (..., 3) m, and `sizes[1]` entries, in the first rows of `keys` and `sums`. `keys` (..., 2): action, and
-    index of the target, of each entry; `sums` (..., 2): sum and number of the values of each entry. `weighing`: a scale and a largest
-    distance [m]: the weight of a target at a distance d is 1 / (1 + d / scale), and 0 beyond the largest distance.
+    An entry of the record has the values of one action on one target. `out` (2, actions), to which the results are added: the sum of the
+    weighted values, and the sum of the weights. `targets` (..., 3) m: only the first `sizes[0]` rows are used. `keys` (..., 2): action and
+    index of the target of each entry; `sums` (..., 2): sum and number of its values; of both only the first `sizes[1]` rows are used.
+    `weighing`: a scale and a largest distance [m]: the weight of a target at a distance d is 1 / (1 + d / scale), and 0 beyond the largest
+    distance.
     """
     history = _History(address(targets), address(keys), address(sums), *sizes, *weighing)
     totals = address(out)
@@ -173,9 +175,9 @@ def weighted_sums(
 
 
 def gaussian_sums(asked: Array, events: Array, sums: Array) -> None:
-    """Sum the values of events for each of the n points `asked` (n, d), weighted by their distances.
+    """Add up the values of all events for each of the n points `asked` (n, d), weighted by the distances of the events from the point.
 
-    `events` (..., d + 1): each row is a point (d numbers) and a value.  The weight of an event at a distance r is exp(-r^2 / 2). `sums`
-    (2, n): the sum of the weighted values, and the sum of the weights, of each point are added to it.
+    `events` (..., d + 1): each row is the point of an event (d numbers) and its value.  The weight at a distance r is exp(-r^2 / 2). `sums`
+    (2, n), to which the results are added: the sum of the weighted values, and the sum of the weights, for each point.
     """
     _gaussian_sums(address(asked), *asked.shape, address(events), len(events), address(sums))

@@ -47,7 +47,9 @@ class Motors(ctypes.Structure):
 class Braking(ctypes.Structure):
     """The tables with which the core limits the commands of n motors so that they can always brake before their limits.
 
-    They are the limits of the positions and the commanded velocities, each (n,). The caller keeps the arrays alive.
+    `lower`, `upper`, `fastest`, `change` and `velocity` are the addresses of arrays (n,), which the caller keeps alive: limits of the
+    positions, largest velocities, largest changes of the velocity in a tick, and commanded velocities. `count`: n. `dt`: duration of a
+    tick [s].
     """
 
     _fields_ = (

@@ -163,10 +163,11 @@ def cast(
 
 
 def shade(which: NDArray[np.int32], normal: Floats, pixels: NDArray[np.int64], colors: Floats, lamp: Lamp, brightness: Floats) -> None:
-    """Add the colours of what R rays hit to the brightness of K pixels, in place.
+    """Add the colour of what a ray hits, as the lamp lights it, to the brightness of each of K pixels, in place.
 
-    `brightness` (K, 3): red, green and blue, 0 to 255. `which` (R,) and `normal` (R, 3): index of the hit volume or surface, and its
-    normal, as `cast` returns them. `pixels` (K,): index of the ray of each pixel. `colors` (N, 3): 0 to 255, by index.
+    `brightness` (K, 3): red, green and blue, 0 to 255. `which` (R,) and `normal` (R, 3): of R rays, the index of the volume or surface
+    that is hit, and its normal, as `cast` returns them. `pixels` (K,): index of the ray of each pixel. `colors` (N, 3): red, green and
+    blue, 0 to 255, of each index in `which`.
     """
     arrays = (address(array) for array in (which, normal, pixels, colors, brightness))
     towards, nothing = (REAL * 3)(*(float(np.float32(one)) for one in lamp.towards)), (ctypes.c_float * 3)(*lamp.nothing)

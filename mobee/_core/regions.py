@@ -40,7 +40,7 @@ class Region:
 def regions(likeness: NDArray[np.float32], least: float, around: int) -> list[Region]:
     """Return the regions of a colour in a picture: sets of pixels of this colour, each pixel connected with others by its sides.
 
-    Regions that are connected with each other only by corners of pixels follow each other in the result.
+    Regions that touch each other only at corners of pixels are consecutive in the result.
 
     Args:
         likeness: how much of the colour is in each pixel (H, W), proportional to the share of the pixel that has the colour; 0: none.

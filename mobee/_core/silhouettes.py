@@ -87,15 +87,16 @@ class Silhouette:
     def rows(self, position: Array, turn: Array, touching: tuple[Array, Array], errors: Array) -> tuple[Array, Array]:
         """Return the distances of the outline's m points from the computed silhouette, (m,) px, and their derivatives (m, p).
 
-        A distance is positive outside. The p columns are the derivatives by the position (3), by the lengths of the shape, by the angle
-        about the vertical (if it is unknown), and by the errors. The next call overwrites both arrays.
+        A distance is positive outside. The p columns are the derivatives by the position (3), by the logarithms of the shape's lengths, by
+        the angle about the vertical (if it is unknown), and by the errors. The next call overwrites both arrays.
 
         Args:
             position: position of the shape's middle, (3,) m, root frame.
             turn: rotation of the shape's axes, (3, 3), root frame.
             touching: the points (K, 3) m of the shape that are farthest along the K normals, relative to its middle, in the camera's axes,
                 and the coordinates (K,) of their images along the normals.
-            errors: the errors of the cameras and outlines, in standard deviations.
+            errors: (e,) estimated errors, in standard deviations: noise and bias of the cameras, three shifts of the outline in each
+                picture (along column and row, and outwards), and two of the outlines in all pictures.
         """
         given, (offsets, farthest) = self._given, (np.ascontiguousarray(array, dtype=np.float64) for array in touching)
         errors = np.ascontiguousarray(errors, dtype=np.float64)

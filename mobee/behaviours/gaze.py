@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Gaze: neck and eyes keep a place in the middle of the pictures of all cameras.
 
-Motors that move cameras but no shapes, the eyes, point the cameras at the target. Their goal is computed for the posture that all other
-motors will have after the lag, so that the eyes also compensate the motion of neck and torso (the vestibulo-ocular reflex). The other
-motors of the part, the neck, move to the posture in which the eyes are in the middle of their range. A `Reference` moves both to their
-goals: at full speed while the target is far from the middle of the pictures (a saccade), and with the target's own velocity near it (smooth
-pursuit).
+Motors that move cameras but no shapes (the eyes) point the cameras at the target. Their goal is computed for the posture that all other
+motors will have after the delay of the motors, so that the eyes also compensate the motion of neck and torso (the vestibulo-ocular reflex).
+The other motors of the part that move cameras (the neck) move to the posture in which the eyes are in the middle of their range. A
+`Reference` (a speed-limited trajectory) moves both to their goals: at full speed while the target is far from the middle of the pictures (a
+saccade), and with the target's own velocity near it (smooth pursuit).
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class Movement:
     """How a part should move at present, in the form that `Controller.follow` needs.
 
     `q`: (n_part,) rad, positions. `velocity`: (n_part,) rad/s. `phase`: "saccade" (fast motion to a far target) or "pursuit" (motion with a
-    near target). `error`: largest angle between a direction of view and the target now [rad].
+    near target). `error`: present angle between a camera's direction of view and the target, the largest of all cameras [rad].
     """
 
     q: Array
@@ -87,7 +87,7 @@ class Gaze:
         self._phase: Phase = "saccade"
 
     def reset(self) -> None:
-        """Forget the present motion; the next call of `step` starts from rest."""
+        """Discard the reference motion; the next call of `step` starts a new one from rest."""
         self._reference = None
 
     def offsets(self, q: Array, target: Array) -> Array:
@@ -200,8 +200,8 @@ class Gaze:
 def gaze_motors(robot: Robot, part: str, links: Iterable[int], movable: NDArray[np.bool_] | None = None) -> tuple[Ints, Ints]:
     """Return the indices of the motors of a part that move at least one of the links: the eyes and the neck.
 
-    The result has the indices of the eyes' motors, which move no shape, and those of the neck, which are all others. `links`: numbers of
-    the links that carry cameras. `movable`: (n,) whether each motor may be moved; None: all. Raises InvalidValue if there are no such
+    The first array has the indices of the motors that move no shape (the eyes), the second those of all others (the neck). `links`: indices
+    of the links that carry cameras. `movable`: (n,) whether each motor may be moved; None: all. Raises InvalidValue if there are no such
     motors, and UnknownName for an unknown part.
     """
     span, matrix, ancestry = robot.part(part).slice, robot.coupling[0], tables(robot).ancestry

@@ -28,14 +28,14 @@ UP = np.array([0.0, 0.0, 1.0])
 class Grip:
     """The pose of a palm when its hand closes around an upright thing, and how it closes; the defaults are for the iCub.
 
-    The numbers were found in MuJoCo. The axes of a palm are x along its fingers, -y to its thumb, z its normal.
+    The numbers were found by simulation in MuJoCo. The axes of a palm are x along its fingers, -y to its thumb, z its normal.
 
     Attributes:
-        along: m, from the palm's marker to the thing's axis, along the fingers.
-        gap: m, between palm and thing when the hand closes.
-        before: m, between palm and thing at the pre-grasp.
-        height: m, of the palm above the ground on which the thing stands; at this height the ground does not touch the fields of hand and
-            forearm (volumes that cause repulsive forces).
+        along: distance from the palm's marker to the thing's axis, along the fingers [m].
+        gap: distance between palm and thing when the hand closes [m].
+        before: distance between palm and thing at the pre-grasp, the pose before the hand moves to the thing [m].
+        height: height of the palm above the ground on which the thing stands [m]; at this height the ground does not touch the fields of
+            hand and forearm (volumes that cause repulsive forces).
         oppose: rad, opposition of the thumb.
         spread: rad, spread of the fingers.
         fingers: share by which the fingers close, 0 open to 1 closed.
@@ -89,9 +89,9 @@ class SideGrasp:
     Args:
         model: the robot in a world with the objects that it must not touch.
         marker: name of the palm's marker.
-        motors: names of the parts and motors that move, without those of the fingers.
+        motors: names of parts and of single motors that may move, without the motors of the fingers.
         starts: (S, n) rad, postures from which inverse kinematics starts, and near which its results stay.
-        pushing: the robot in the world from which the control law's repulsive forces are computed; None: `model`.
+        pushing: the robot in another world, from whose objects the control law's repulsive forces are computed; None: `model`.
     """
 
     def __init__(self, model: Model, marker: str, motors: Sequence[str], starts: ArrayLike, pushing: Model | None = None) -> None:
@@ -127,10 +127,10 @@ class SideGrasp:
         return held
 
     def posture(self, palm: Palm, starts: Array | None = None) -> Array | None:
-        """Return the posture (n,) rad with this pose of the palm in which the control law's forces are smallest and no solids touch.
+        """Return a posture (n,) rad without contacts of solids in which the palm has this pose; None if none is found.
 
-        `starts`: (S, n) rad, postures from which inverse kinematics starts; None: the `starts` of this object. The forces are compared by
-        `push`, without spring and damping. None is returned if no posture is found.
+        It is the one with the smallest `push` among the results of inverse kinematics. `starts`: (S, n) rad, postures from which inverse
+        kinematics starts; None: the `starts` of this object.
         """
         found: list[tuple[float, Array]] = []
         for start in self.starts if starts is None else starts:

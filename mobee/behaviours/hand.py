@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The fingers of a hand: open, closed, and closed until they touch something (thesis 9.4.2).
 
-Fingers are the links that only motors beyond the palm move. The couplings of their joints are those of the robot's file.
+Motors of the fingers are those that move only links beyond the palm. One motor may drive several joints, as the robot's file says.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ STEPS = 60  # from open to closed, in which contacts are looked for
 
 
 class Hand:
-    """The motors of the fingers of one hand.
+    """The finger motors of one hand.
 
-    `open`, `closed`: (m,) rad, the ends of the motors' ranges at which the hand is open and closed, in the order of `motors`.
+    `motors`: (m,) indices, ascending. `open`, `closed`: (m,) rad, the ends of these motors' ranges at which the hand is open and closed.
     """
 
     def __init__(self, robot: Robot, marker: str) -> None:

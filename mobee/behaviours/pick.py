@@ -45,7 +45,7 @@ TURNS = tuple(np.deg2rad(sorted(np.arange(45.0, -46.0, -7.5), key=abs)).tolist()
 class Followed:
     """The end of a motion along a path.
 
-    `bumped`: whether the robot bumped into something. `q`: (n,) rad, the posture at the end.
+    `bumped`: whether the motion ended early because the robot bumped into something. `q`: (n,) rad, the posture at the end.
     """
 
     bumped: bool
@@ -111,7 +111,7 @@ class Upright:
 
 
 class NoPosture(MobeeError):
-    """Raised if the robot has no posture for a step, or no motion without contacts."""
+    """Raised if the robot has no posture for a step of picking or putting down, or no motion to it without contacts."""
 
 
 def azimuth_beside(place: Array) -> float:
@@ -126,8 +126,8 @@ def azimuth_beside(place: Array) -> float:
 def beside(grasp: SideGrasp, thing: Upright, azimuth: float, gap: float, above: float, starts: Array | None) -> Array | None:
     """Return the posture (n,) rad with the palm beside a thing, or None if there is none.
 
-    `azimuth`: direction that the palm faces [rad]. `gap`: between palm and thing [m]. `above`: height of the palm above that of a grasp
-    [m]. `starts`: (S, n) rad, postures from which inverse kinematics starts; None: those of `grasp`.
+    `azimuth`: direction that the palm faces [rad]. `gap`: distance between palm and thing [m]. `above`: by how much the palm is higher than
+    at a grasp [m]. `starts`: (S, n) rad, postures from which inverse kinematics starts; None: those of `grasp`.
     """
     return grasp.posture(palm_beside(thing.place, thing.radius, azimuth, gap, thing.ground + above, grasp.grip), starts)
 
@@ -147,10 +147,10 @@ class PreGrasp:
 
 
 def pre_grasps(grasp: SideGrasp, thing: Upright) -> list[PreGrasp]:
-    """Return the pre-grasps from which the hand can move to the thing, the best first; those that are reached from above are last.
+    """Return the pre-grasps from which the hand can move to the thing: first those that are reached from the side, then those from above.
 
-    The best pre-grasps are those in which the control law's repulsive forces are smallest, from the pre-grasp until the thing is lifted,
-    because these forces displace the palm. The list is empty if no pre-grasp is found.
+    In both groups the best is first: the one with the smallest repulsive forces of the control law from the pre-grasp until the thing is
+    lifted, because these forces displace the palm. The list is empty if no pre-grasp is found.
     """
     found: list[tuple[float, PreGrasp]] = []
     for turn in TURNS:
@@ -200,7 +200,7 @@ class Picker:
         self._fingers: Array = grasp.closed(body.q)[grasp.hand.motors]  # rad, where they hold
 
     def settle_at(self, q: Array) -> Array:
-        """Move torso and arm to q (n,) rad as exactly as possible; return the attractor (n,) rad that this needs.
+        """Move torso and arm to the posture q (n,) rad as exactly as possible; return the attractor (n,) rad that was needed for this.
 
         After each settled motion, the remaining error of the posture is added to the attractor, at most four times.
         """
@@ -215,7 +215,7 @@ class Picker:
         return aim
 
     def move(self, path: Array, speed: float, watch: BumpWatch | None = None) -> bool:
-        """Move along a path (K, n) rad, with an attractor that cancels the control law's forces; return whether the robot hit something.
+        """Move along a path (K, n) rad, with an attractor that cancels the control law's forces; return whether a bump was detected.
 
         `speed`: share of the largest speed. `watch`: detects bumps; at a bump the robot moves back a little and the motion ends; None:
         bumps are not detected.
@@ -223,10 +223,9 @@ class Picker:
         return self.body.follow_path(path, speed, watch, self.grasp.forces).bumped
 
     def arrive(self, goal: PreGrasp, watch: BumpWatch | None = None) -> bool:
-        """Move the hand from its posture away from the thing straight to the pre-grasp; return whether it bumped into something.
+        """Settle at the posture `goal.away`, then move straight to the pre-grasp `goal`; return whether the hand bumped into something.
 
-        `goal`: the pre-grasp; the hand first settles at its posture `away`. `watch`: detects bumps; at a bump the robot moves back a little
-        and the motion ends; None: bumps are not detected.
+        `watch`: detects bumps; at a bump the robot moves back a little and the motion ends; None: bumps are not detected.
         """
         self.settle_at(goal.away)
         if self.move(np.stack([goal.away, goal.posture]), SLOW, watch):
@@ -273,8 +272,8 @@ class Picker:
     def put(self, thing: Upright, places: Sequence[Array], centre: Array | None = None) -> Array:
         """Put the thing in the hand down at one of the places (2,) m, open the hand and retreat; return the place.
 
-        The first place is used at which the control law's repulsive forces are small, or else the place with the smallest forces. If the
-        hand or the thing bumps into something on the motion down, the hand moves up again and then to another place.
+        It is the first of the places at which the control law's repulsive forces are small, or else the one with the smallest forces. If
+        the hand or the thing bumps into something on the motion down, the hand moves up again and tries another place, at most 3 in all.
 
         Args:
             thing: the thing as it was seen before the grasp.
@@ -282,8 +281,8 @@ class Picker:
             centre: (3,) m, root frame, where the cameras see the centre of the thing now; None: it has not slipped in the hand.
 
         Raises:
-            NoPosture: no place is suitable.  Then the hand has put the thing back where it was lifted, or still holds it after another
-                bump.
+            NoPosture: the thing could not be put down at any place.  Then the hand has put it back where it was lifted, or still holds it
+                after another bump.
         """
         slipped = np.zeros(3) if centre is None else self.slipped(thing, centre)
         held = self._model_with(thing, slipped)

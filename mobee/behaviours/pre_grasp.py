@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Paths to a pre-grasp: a map of poses beside upright things, and new plans after the arm bumps into something (thesis 4.3.3)."""
+"""Paths to a pre-grasp, a pose beside an upright thing: a roadmap of such poses, and new plans after bumps (thesis 4.3.3)."""
 
 from __future__ import annotations
 
@@ -47,16 +47,16 @@ _RIGHT = {"shoulder_pitch": 0.0, "shoulder_roll": 80.0, "shoulder_yaw": -20.0, "
 
 
 def icub_starts(robot: Robot) -> Array:
-    """Return two postures (2, n) rad of an iCub from which inverse kinematics starts; the left arm is out of the way.
+    """Return two start postures (2, n) rad for inverse kinematics of an iCub's right arm, with the left arm moved aside.
 
-    In the second posture the right elbow is away from the body too.
+    In the second posture the right elbow is also away from the body.
     """
     aside = _changed(robot, robot.home, "l", _LEFT)
     return np.stack([aside, _changed(robot, aside, "r", _RIGHT)])
 
 
 def pre_grasp_map(grasp: SideGrasp, ground: float) -> Roadmap:
-    """Return a roadmap of poses with the thumb up, whose task is the palm's position and the azimuth that it faces (thesis fig. 4.8).
+    """Return a roadmap of postures with the thumb up; its task space is the palm's position and the azimuth it faces (thesis fig. 4.8).
 
     `ground`: height of the surface on which things stand [m]. The world of `grasp` should not contain the things. Building takes seconds.
     """
@@ -75,9 +75,10 @@ def pre_grasp_map(grasp: SideGrasp, ground: float) -> Roadmap:
 
 
 def aside(trm: Roadmap, ground: float, grip: Grip) -> Array:
-    """Return the posture (n,) rad of the pre-grasp map `trm` with the hand at the side of the table, where it hides nothing.
+    """Return a posture (n,) rad of the roadmap `trm` with the hand at the side of the table, where it hides nothing from the cameras.
 
-    `ground`: height of the surface on which things stand [m]. `grip`: its `height` is that of the palm above this surface.
+    `trm`: as `pre_grasp_map` returns it. `ground`: height of the surface on which things stand [m]. `grip`: its `height` is that of the
+    palm above this surface.
     """
     posture: Array = trm.q[trm.exit(np.array(ASIDE) + np.array([0.0, 0.0, ground + grip.height, 0.0]))]
     return posture
@@ -134,9 +135,9 @@ class MapPlanner:
 
 
 def near_any(palms: Array, blocked: Array) -> NDArray[np.bool_]:
-    """Return whether each of the palm positions (P, 3) m is beside, below or just above one of the blocked positions (B, 3) m, (P,).
+    """Return for each of the palm positions (P, 3) m whether it is near one of the blocked positions (B, 3) m: booleans (P,).
 
-    Beside means within 5 cm horizontally, just above means less than 6.5 cm higher.
+    Near means within 5 cm horizontally, and lower than 6.5 cm above the blocked position.
     """
     beside = np.linalg.norm(palms[:, None, :2] - blocked[:, :2], axis=2) <= AROUND
     found: NDArray[np.bool_] = (beside & (palms[:, None, 2] < blocked[:, 2] + OVER)).any(axis=1)
@@ -146,8 +147,8 @@ def near_any(palms: Array, blocked: Array) -> NDArray[np.bool_]:
 def is_around(model: Model, marker: str, path: Array, blocked: Array) -> bool:
     """Return whether the marker stays away from the blocked positions (B, 3) m on a path (K, n) rad.
 
-    A position is near a blocked one as in `near_any`. The path may begin near a blocked position, but once it is away from all of them it
-    must not come near one again. The result is also True for a path that is near blocked positions from its start to its end.
+    `near_any` defines near. The path may begin near a blocked position, but once it is away from all of them it must not come near one
+    again. The result is also True for a path that is near blocked positions from its start to its end.
     """
     if not len(blocked):
         return True
@@ -162,8 +163,8 @@ def is_around(model: Model, marker: str, path: Array, blocked: Array) -> bool:
 class Approach:
     """The result of `approach`.
 
-    `azimuth`: direction that the palm faces in the pre-grasp that was reached [rad]; None if none was reached. `bumps`: number of bumps.
-    `plans`: number of plans. `planning`: processor time for planning [s].
+    `azimuth`: direction that the palm faces in the pre-grasp that was reached [rad]; None: none was reached. `bumps`: number of bumps.
+    `plans`: how often a path was planned. `planning`: processor time for all planning [s].
     """
 
     azimuth: float | None = None
@@ -175,8 +176,9 @@ class Approach:
 def approach(body: Body, picker: Picker, thing: Upright, plan: Planner) -> Approach:
     """Move the palm to a pre-grasp of a thing along planned paths, with a new plan after each bump.
 
-    A new path must move around or over the positions of the palm at earlier bumps. After a bump, pre-grasps that are reached from above are
-    preferred, because the object that was hit is beside the thing. At most 8 plans are made.
+    A new path must move around or over the positions of the palm at earlier bumps; if there is no such path, these positions are discarded.
+    After a bump the pre-grasp is not tried again, and pre-grasps that are reached from above are preferred, because the object that was hit
+    is beside the thing. At most 8 plans are made.
     """
     found, model, blocked = Approach(), picker.grasp.model, np.empty((0, 3))
     watch = BumpWatch(model.robot, picker.watched)

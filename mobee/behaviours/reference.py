@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A reference that catches up with a moving goal, within the speed and acceleration of the motors."""
+"""A reference trajectory that catches up with a moving goal, within the limits of speed and acceleration of the motors."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ LEASH = np.deg2rad(15.0)  # rad by which the reference may be ahead of its motor
 
 
 class Reference:
-    """The reference of some motors, which moves towards a moving goal within the limits of speed and acceleration.
+    """The reference trajectory of m motors, which moves towards a moving goal within the limits of speed and acceleration.
 
-    `q`: (m,) rad and `velocity`: (m,) rad/s are its present state.
+    `q`: (m,) rad, its present position. `velocity`: (m,) rad/s.
     """
 
     def __init__(self, robot: Robot, where: slice, q: Array, low: Array, high: Array, speed: float = SPEED) -> None:

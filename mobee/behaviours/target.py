@@ -58,5 +58,5 @@ class TargetTrack:
         return places.mean(axis=0) + (t - times.mean()) * velocity, velocity
 
     def forget(self) -> None:
-        """Remove all places; called at the start of a new run."""
+        """Remove all places; call this when the robot is restarted, since its clock then begins again."""
         self._seen.clear()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks the clauses of a robot: contradictions with limits or each other, violations at home, rows without effect."""
+"""Checks the clauses of a robot, its conditions on motor positions: contradictions, violations at home, rows without effect."""
 
 from __future__ import annotations
 
@@ -140,9 +140,9 @@ MARGIN = 1e-6  # rad
 def conflict(clauses: Sequence[Clause], limits: Array, poses: Array) -> tuple[int, ...]:
     """Return the indices of a small set of clauses (conditions on motor positions) that contradict each other; () if none is found.
 
-    No pose was found that satisfies all clauses of the set; if any single clause is removed from it, a pose is found. `limits` (n, 2) rad.
-    `poses` (k, n) rad: poses within the limits from which the search starts. The search may fail although such a pose exists, but the
-    returned set is small enough for a person to judge.
+    The search found no pose that satisfies all clauses of the set, but finds one if any single clause is removed. It may miss a pose that
+    exists; the set is small enough for a person to judge. `limits` (n, 2) rad: of the motors. `poses` (k, n) rad: poses within the limits
+    from which the search starts.
     """
     for group in _connected(clauses):
         if _satisfiable([clauses[k] for k in group], limits, poses):

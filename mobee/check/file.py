@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks a file: warnings of its reader, elements of older versions, then the robot or world in it."""
+"""Checks a robot or world file: warnings while it is read, elements of older versions of the format, and its content."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ from mobee.robot.xml.versions import CONVERT, WORLD_TAGS, upgrade_robot, upgrade
 
 
 def source(root: Node) -> Iterator[Finding]:
-    """Yield findings about the elements of a robot file in zero-position XML, or of a world file.
+    """Yield findings about the XML elements of a robot file in zero-position XML, or of a world file.
 
-    `root`: the root element; its elements are rewritten into today's grammar, in place.
+    `root`: the root element; elements of older versions of the format are rewritten to the present version, in place.
     """
     where = f"{root.file}:{root.line}"
     yield from _empty_names(root)

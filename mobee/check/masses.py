@@ -20,7 +20,7 @@ MAX_OUTSIDE = 0.1  # m: how far a centre of mass may always lie outside its link
 
 
 def masses(subject: Subject) -> Iterator[Finding]:
-    """Yield all findings about the robot's masses; no findings for a robot without masses."""
+    """Yield all findings about the masses of the robot's links; none for a robot whose file has no masses."""
     if not subject.robot.bodies:
         return
     yield from _total(subject)

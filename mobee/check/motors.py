@@ -162,10 +162,10 @@ ROUNDING = 1e-4  # of the motor's range: tolerance for the digits of a file
 
 
 def home_zones(subject: Subject) -> Iterator[Finding]:
-    """Yield a note on all motors whose home is in a limit zone of the default gains, and a second one on those whose zone ends at home.
+    """Yield up to two notes on motors whose home is in the limit zone of the default gains.
 
-    In a limit zone, a range before the limit, the control law pushes the motor inward. So it pushes the motors of the first note away from
-    home. The motors of the second note rest at home, because their zone is made narrower and ends there.
+    In the limit zone, a range before the limit, the control law pushes the motor inward. The first note lists the motors that it pushes
+    away from home. The second lists the motors whose zone is made narrower so that it ends at home; they rest at home.
     """
     units = motor_units(subject.robot)
     better = {

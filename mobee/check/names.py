@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks the names in a robot: names that differ in upper and lower case only, and names that are not valid in keys or lists."""
+"""Checks the names in a robot: names that differ in upper and lower case only, and names that cannot be in a bus key or a list."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def names_differing_in_case(subject: Subject) -> Iterator[Finding]:
 
 
 def unusable_names(subject: Subject) -> Iterator[Finding]:
-    """Yield a finding for each part with a name that is not valid in a key of the bus, and for each motor with a blank or comma in it."""
+    """Yield a finding for each part with a name that cannot be in a key of the bus, and each motor with a blank or comma in its name."""
     for part in subject.robot.parts:
         if not KEY.fullmatch(part):
             yield Finding(

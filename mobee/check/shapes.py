@@ -28,7 +28,7 @@ def surface(shape: Shape) -> Array:
 def outside(shape: Shape, points: Array) -> Array:
     """Return the distances (k,) m of `points` (k, 3) m from a shape, 0 for points inside; root frame, zero pose.
 
-    For a convex shape the distance is a lower bound, computed from many planes around the shape.
+    For a convex shape (a hull) the distance is a lower bound, computed from many planes around the shape.
     """
     local = (points - shape.position) @ shape.rotation
     if shape.kind == "convex":  # beyond the nearest of many planes around it
@@ -82,8 +82,7 @@ Link = tuple[list[Shape], list[Shape]]  # solids, fields
 def fields(subject: Subject) -> Iterator[Finding]:
     """Yield findings about fields inside solids, solids that extend beyond all fields of their link, and links with solids but no field.
 
-    A field is a volume around a solid that causes a repulsive force. For a robot without any field the only finding is a note that says
-    this.
+    A field is a volume around a solid that causes a repulsive force. For a robot without any field, the only finding is a note about this.
     """
     links: dict[tuple[int, str], Link] = defaultdict(lambda: ([], []))  # two robots may stand on one base
     for shape in subject.robot.shapes:
@@ -185,7 +184,7 @@ SUM_WEIGHT = 1e4  # of the condition that the shares sum to 1, relative to the h
 
 
 def hulls(robot: Robot, exact: Robot) -> Iterator[Finding]:
-    """Yield a note if reduced hulls of meshes extend beyond the exact hulls.
+    """Yield a note if convex hulls of meshes with a reduced number of corners extend beyond the exact hulls.
 
     `robot`: the robot with reduced hulls. `exact`: the same robot, read with `corners="all"`.
     """

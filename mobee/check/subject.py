@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The robot under check, with sampled poses and contacts that several checks use."""
+"""The robot that is checked, with sampled poses and contacts that several checks use."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Subject:
         self.world = world
 
     def where(self, kind: str, name: str) -> str:
-        """Return "file:line" of an element, for example ("joint", name); that of the robot if the reader did not record the element."""
+        """Return "file:line" of an element, such as kind "joint" and its name; that of the robot if the element's line is not known."""
         return self.robot.where.get((kind, name)) or self.robot.where.get(("robot", self.robot.name)) or self.robot.name
 
     @property
@@ -105,10 +105,10 @@ class Subject:
 
     @cached_property
     def foreign(self) -> tuple[tuple[Shape, Shape, float], ...]:
-        """The fields that overlap a solid of another part at home, but touch no field of the link of this solid.
+        """The fields that overlap a solid of another part at home, where no field of the solid's link touches them.
 
-        Each is given as (field, solid, depth [m]). Only two fields that overlap cause a repulsive force, so no force keeps the field's part
-        away from the solid.
+        Each is given as (field, solid, depth [m]). A repulsive force needs two fields that overlap, so no force keeps the field's part away
+        from the solid.
         """
         robot, shapes = self.limited, self.robot.shapes
         tested = {frozenset((shapes[i].link, shapes[j].link)) for i, j in robot.solid_pairs}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Finds links that touch at home or in every pose, and pairs that are never tested; writes touching pairs into an SRDF."""
+"""Finds links that touch at home or in every pose, and pairs never tested for contacts; writes touching pairs into an SRDF."""
 
 from __future__ import annotations
 
@@ -260,10 +260,10 @@ def _parting(subject: Subject, contact: Contact) -> str:
 
 
 def foreign_solids(subject: Subject) -> Iterator[Finding]:
-    """Yield a note for each pair of parts of which a field of one overlaps a solid of the other at home, but no field of the solid's link.
+    """Yield a note for each pair of parts that are near each other at home without a force: a field of one overlaps a solid of the other.
 
-    Only two fields that overlap cause a repulsive force, so no force keeps the two parts from each other there. The note gives the deepest
-    such overlap.
+    A repulsive force needs two fields that overlap, but no field of the solid's link touches this field. The note gives the deepest such
+    overlap.
     """
     deepest: dict[tuple[str, str], tuple[Shape, Shape, float]] = {}
     for field, solid, depth in subject.foreign:
@@ -295,10 +295,10 @@ def _left_out(subject: Subject, one: int, other: int) -> bool:
 class LeftOut:
     """The result of `leave_out_touching`.
 
-    `path`: path of the SRDF file. `merged`: whether the file existed before, or the text of another SRDF was copied. `pairs`: the pairs
-    that were added to the file. `enabled`: the touching pairs that were not added, because the file enables their test. `touching`: number
-    of contacts of solids that remain at home when the robot is read with the new file. `found`: whether `load_robot` finds the file without
-    being given its path.
+    `path`: path of the SRDF file. `merged`: True: the pairs were added to the text of an existing SRDF; False: the file is new. `pairs`:
+    the pairs that were added. `enabled`: the touching pairs that were not added, because the SRDF explicitly enables their test.
+    `touching`: number of contacts of solids that remain at home when the robot is read with the new file. `found`: whether `load_robot`
+    finds the file if it is not given its path.
     """
 
     path: Path
@@ -313,7 +313,7 @@ def leave_out_touching(urdf: str | Path, out: Path | None = None, **options: Any
     """Write <disable_collisions> into an SRDF for every two links of a URDF whose solids touch at home or in all random poses.
 
     `out`: path of the SRDF; None: the SRDF that `load_robot` reads with this URDF, or a new one beside the URDF. The text of an existing
-    SRDF is kept word for word. The file is written completely or not at all. `options`: keyword arguments of `load_robot`. Raises
+    SRDF is not changed, only added to. The file is written completely or not at all. `options`: keyword arguments of `load_robot`. Raises
     RobotFileError, and InvalidValue for a file that is not a URDF or a target that cannot be used.
     """
     path = find_file(urdf, ROBOTS, "robot")

@@ -48,7 +48,7 @@ def size(subject: Subject) -> Iterator[Finding]:
 
 
 def radians(subject: Subject) -> Iterator[Finding]:
-    """Yield a finding if ranges of motors look like radians that were read as degrees; not for a URDF, which is in radians."""
+    """Yield a finding if ranges of motors are probably radians that were read as degrees; not for a URDF, which is in radians."""
     if subject.is_urdf:
         return
     turning = [motor for motor in subject.robot.motor_table if _turns(subject, motor)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks the visuals of a robot: finds mesh files that are missing."""
+"""Checks the visuals of a robot, its drawn surfaces: finds mesh files that do not exist."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from mobee.robot.urdf.mesh import first_file, mesh_places, searched
 
 
 def missing_meshes(subject: Subject) -> Iterator[Finding]:
-    """Yield one finding if mesh files of the robot's visuals are missing."""
+    """Yield one finding if mesh files of the robot's visuals (its drawn surfaces) do not exist."""
     sources = dict.fromkeys(visual.mesh for visual in subject.robot.visuals if visual.mesh is not None)
     missing = [one for one in sources if first_file(mesh_places(one.file, one.robot_file)) is None]
     if missing:

@@ -17,7 +17,7 @@ THIN = 0.02  # m: at 2 m/s and 100 Hz a hand moves this far between two ticks
 
 
 def check_world(world: World, lines: Mapping[str, str]) -> list[Finding]:
-    """Return all findings about a world; `lines`: name of the object -> "file:line" of the object."""
+    """Return all findings about a world; `lines`: dict from the name of each object to its place in the file, "file:line"."""
     found = [finding for thing in world.objects.values() for finding in _check_object(thing, lines.get(thing.name, thing.name))]
     return found + list(_duplicates(world, lines))
 

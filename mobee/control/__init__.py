@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reactive control (thesis chapter 5): constraint forces, the dynamical system, reaching, and the test whether a part has settled."""
+"""Reactive control (thesis chapter 5): constraint forces, the control law, reaching, and the test whether a part has come to rest."""
 
 from mobee.control.controller import Controller as Controller
 from mobee.control.forces import Forces as Forces

@@ -152,7 +152,7 @@ class Controller:
 
     @property
     def pushed(self) -> bool:
-        """Whether a force of `push` acts on a marker. Such a force on the motors depends on the pose."""
+        """Whether a force given to `push` acts on a marker; its projection to the motors depends on the pose."""
         return bool(self._pushes)
 
     @property
@@ -161,9 +161,9 @@ class Controller:
         return self._reaches
 
     def client_force(self, q: Array) -> Array:
-        """Return the forces of the client at q (n,) rad, f_config + f_work of thesis eqs. 5.9 and 5.10, (n,) rad/s^2.
+        """Return the client's force at q (n,) rad, f_config + f_work of thesis eqs. 5.9 and 5.10, (n,) rad/s^2.
 
-        These are the forces given to `force` and `push`, each bounded. 0 if there are none.
+        f_config is the force given to `force`, and f_work the projected sum of the forces given to `push`, each bounded; 0 without any.
         """
         total = np.zeros(len(q))
         if self._pushes or self.forced:
@@ -240,14 +240,15 @@ class Controller:
     def is_approaching(self, part: str | None) -> bool:
         """Return whether the reach of a part (None: of the whole body) still moves its marker nearer to the target.
 
-        An action with a reach is over only when this is False. It is always False under the published law, and without a reach.
+        An action with a reach is over only when this is False. It is always False without a reach, and with the gains of 2014
+        (`Gains.published_2014`).
         """
         return self._reaches.is_approaching(part)
 
     def reset(self, q: Array) -> None:
         """Set the control law to rest at the measured q (n,) rad: own velocity 0, attractor and position reference at q.
 
-        Forces of clients and reaches continue.
+        Forces given to `force` and `push`, and reaches, continue.
         """
         q = checked("q", q, len(self.robot.motors))
         self._attractor[:] = q

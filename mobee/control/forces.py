@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The constraint forces of the control law by name, as the model publishes them in every tick, and checks of force values."""
+"""The constraint forces of the control law by name, and checks of force values."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ class Forces(Mapping[str, Array]):
 
     First are the forces of the control law, in the order in which they are added: `limits`, `constraints` and `collision`, which are f_lim,
     f_cst and f_coll of thesis eq. 5.7. Then come the forces of user-defined terms. A force can also be read as an attribute:
-    `forces.limits`. The forces `limits`, `constraints` and `collision` depend only on the pose. If somebody has extended the compiled core
-    by forces that depend on the state of the law, such as its velocity, such forces may be missing.
+    `forces.limits`. The forces `limits`, `constraints` and `collision` depend only on the pose. A core that somebody has extended may have
+    more forces, which depend on the state of the law, such as its velocity; an object may be made without these.
     """
 
     __slots__ = ("_rows",)
@@ -83,7 +83,7 @@ class Forces(Mapping[str, Array]):
 def published_terms() -> tuple[str, ...]:
     """Return the names of the control law's forces that depend on the pose only.
 
-    In the live system the model service computes and publishes these forces, and the controller service computes all others.
+    In the live system the model service computes these forces and sends them to the controller service, which computes all others.
     """
     return tuple(name for name in term_names() if name not in state_term_names())
 

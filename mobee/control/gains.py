@@ -37,8 +37,8 @@ class Settle:
 
     A part has settled when the commanded speed and acceleration of all its motors are at most `speed` [rad/s] and `acceleration` [rad/s^2].
     The test is made `first_check` s after the start of the action and then every `interval` s; after `timeout` s the action ends without
-    having settled. For a motor that slides, its speed and acceleration are divided by its fine unit (`mobee.robot.motor_units`) first: 3
-    deg/s are then 0.4 % of its range per second.
+    having settled. For a motor that slides, 1 rad stands for a fraction of its range (`mobee.robot.motor_units.fine_units`): a `speed` of 3
+    deg/s is then 0.4 % of the range per second.
     """
 
     speed: float
@@ -76,15 +76,15 @@ class Gains:
         limit_width: width of the zone before each limit, rad.
         constraint_width: width of the zone before the boundary of a clause, in rad along the normal a / |a| of the row; in the published
             law in units of a.q + b.
-        contact_gain: default law: force in rad/s^2 of a contact with a depth of 1 m and a lever of 1 m/rad; published law: a factor of the
-            same product, which is squared afterwards; the square is in deg/s^2.
+        contact_gain: default law: the force is contact_gain * depth * lever, in rad/s^2, before it is bounded. Published law: this product
+            is squared, and the square is the force in deg/s^2.
         contact_slope, client_slope: slope at 0 of the function that bounds the force (k of eq. 5.8).
         client_squash: "each" bounds a client's force motor by motor (eq. 5.8 as printed), "direction" bounds its norm in each part.
         settle: thresholds of the settle test.
         weights: pairs (pattern of motor names, 0 or 1). A motor of weight 0 is never moved. The first pattern that matches a motor counts;
             a motor without a match has weight 1.
-        motors: pairs (pattern of motor names, gains of these motors), as `with_motors` adds them.
-        groups: pairs like those of `motors`, with lower priority; patterns that match no motor of a robot are ignored.
+        motors: pairs (pattern of motor names, gains of the motors that match it), as `with_motors` adds them.
+        groups: pairs as in `motors`, with lower priority; here a pattern that matches no motor of a robot is ignored.
     """
 
     law: Law
@@ -133,13 +133,14 @@ class Gains:
     def default(cls) -> Gains:
         """Return the default gains: the equations of the thesis with our own tuning.
 
-        A field is a shape around a link; its contacts cause repulsive forces. These gains keep contacts within the fields, so that the
-        solids inside do not touch.
+        A field is a shape around a link; its contacts cause repulsive forces. With these gains fields overlap, but the solids inside do not
+        touch.
 
-        The time constant C/K is 0.32 s. The experiment `gain-tuning` chose the numbers, with the lag and delay of the motors and commands
-        up to three ticks old at 100 Hz. With a stiffer contact the robot begins to oscillate; with stronger springs its links pass through
-        the fields. The springs of torso and shoulders are weaker, because many motors push a hand together. The bound of the contact force
-        is a little above the sum of the springs of an arm, so that a contact is stiff even at the border of a field.
+        The time constant C/K is 0.32 s. The experiment `gain-tuning` chose the numbers, with simulated motors that have lag and delay, and
+        commands up to three ticks old at 100 Hz. With a stiffer contact the robot begins to oscillate; with stronger springs of the
+        attractor its links pass through the fields. The springs of torso and shoulders are weaker, because many motors push a hand
+        together. The bound of the contact force is a little above the sum of the springs of an arm, so that a contact is stiff even at the
+        border of a field.
         """
         return cls(
             law="default",
@@ -163,7 +164,7 @@ class Gains:
     def published_2014(cls) -> Gains:
         """Return the gains of the 2014 program, converted from degrees. They are needed to reproduce the published findings.
 
-        Fingers and eyes do not move. Obstacles enter the fields (shapes around the links that cause repulsive forces) by centimetres.
+        Fingers and eyes do not move. Obstacles penetrate the fields (shapes around the links that cause repulsive forces) by centimetres.
         """
         return cls(
             law="published_2014",
@@ -188,11 +189,10 @@ class Gains:
     def derived(cls) -> Gains:
         """Return the default gains with a larger bound of the contact force (50 rad/s^2), for robots whose fields `mobee.derive` computed.
 
-        A field is a shape around a link; its contacts cause repulsive forces.
-        Such robots have a least lever (`Robot.least_lever`), because of which contacts of all levers have the same stiffness, contact_gain
-        * LEVER^2 = 450 1/s^2 (LEVER: 0.5 m). The lever of a contact is the change of its depth if the motors move by 1 rad. The bound of
-        the default gains is tuned for the wide fields of the iCub; with it, strong springs would press the fields of such a robot's links
-        into each other.
+        A field is a shape around a link; its contacts cause repulsive forces. The lever of a contact is the change of its depth if the
+        motors move by 1 rad. For such robots the force is divided by the squared lever, so that contacts have the same stiffness for all
+        levers well above `Robot.least_lever`: contact_gain * LEVER^2 = 450 1/s^2 (LEVER: 0.5 m). The bound of the default gains is tuned
+        for the wide fields of the iCub; with it, strong springs would press the fields of such a robot's links into each other.
         """
         return replace(cls.default(), max_contact=50.0)
 
@@ -215,7 +215,7 @@ class Gains:
         return replace(self, motors=((pattern, tuple(sorted(gains.items()))), *self.motors))
 
     def of_motors(self, name: str, motors: tuple[str, ...]) -> Array:
-        """Return the gain `name` of each motor, (n,), as it was set, without a conversion for motors that slide.
+        """Return the gain `name` of each motor, (n,), as it was given; numbers in rad are not converted to m for motors that slide.
 
         `motors`: the names of the motors. Raises UnknownName if a pattern that was given to `with_motors` matches none of them.
         """
@@ -226,7 +226,7 @@ class Gains:
         return _first_match(self._changed(name), motors, common)
 
     def of_robot(self, name: str, robot: Robot) -> Array:
-        """Return the gain `name` of each motor of a robot, (n,), in units of rad, or of m for a motor that slides.
+        """Return the gain `name` of each motor of a robot, (n,), in units of rad, or converted to units of m for a motor that slides.
 
         Raises UnknownName if a pattern that was given to `with_motors` matches no motor of the robot.
         """

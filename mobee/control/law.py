@@ -28,7 +28,7 @@ _OF_MOTORS = ("max_spring", "damping", "client_slope", "max_client")
 
 
 class Law:
-    """The control law of one robot as tables for the compiled core. Several threads may use it. Its methods do not check their arrays."""
+    """The control law of one robot, as tables for the compiled core. Several threads may use it. Its methods do not check arguments."""
 
     def __init__(
         self,
@@ -69,7 +69,9 @@ class Law:
         return len(self.motors)
 
     def forces(self, q: Array, torque: Array, state: Table | None = None) -> Array:
-        """Return the constraint forces at q (n,) rad: rows f_lim, f_cst, f_coll, (len(term_names()), n) rad/s^2 (thesis eqs. 5.11 to 5.17).
+        """Return the constraint forces at q (n,) rad, thesis eqs. 5.11 to 5.17: (3, n) rad/s^2, rows f_lim, f_cst and f_coll.
+
+        A core that somebody has extended has more rows, in the order of `mobee._core.law.term_names()`.
 
         `torque` (n,): the sum over all contacts of J^T times depth times normal, m^2/rad, from `Pose.projection` or
         `Pose.projection_of_part`. `state`: the state of the control law before the step; None: at rest.
@@ -87,7 +89,7 @@ class Law:
         return state
 
     def add_client(self, f: Array, total: Array) -> None:
-        """Add L(f), a client's force after it is bounded (thesis eqs. 5.8 to 5.10), to `total`, in place; both (n,) rad/s^2."""
+        """Bound a client's force `f` (thesis eqs. 5.8 to 5.10) and add it to `total`, in place; both (n,) rad/s^2."""
         self._core.client(self.address, numbers(f, len(self)), address(total))
 
     def step(self, q: Array, dt: float, attractor: Array, force: Array, state: Table) -> Array:
@@ -140,8 +142,8 @@ def _clauses(clauses: Sequence[Clause], gains: Gains, units: Array) -> tuple[Tab
 class ClauseRows:
     """The rows a.q + b > 0 of all clauses of a robot (`mobee.robot.robot.Clause`: conditions on motor positions), one below the other.
 
-    `a` (rows, n) and `b` (rows,) rad; `norms` (rows,): |a|; `normals` (rows, n): a / |a|; `clause` (rows,): the clause of each row;
-    `starts` (clauses,): the first row of each clause.
+    `a` (rows, n) and `b` (rows,) rad; `norms` (rows,): |a|; `normals` (rows, n): a / |a|; `clause` (rows,): index of the clause of each
+    row; `starts` (clauses,): index of the first row of each clause.
     """
 
     a: Array

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reaching with the Jacobian transpose (thesis 5.1, eqs. 5.4 to 5.6, Algorithm 5): as a path that is computed before, and tick by tick."""
+"""Reaching with the Jacobian transpose (thesis 5.1, eqs. 5.4 to 5.6, Algorithm 5): as a path computed in advance, and tick by tick."""
 
 from __future__ import annotations
 
@@ -46,9 +46,9 @@ def reach_path(
 ) -> ReachPath:
     """Return a path that moves a marker to a target in steps of alpha J^T dx (thesis eq. 5.4, Algorithm 5); contacts are ignored.
 
-    The thesis leaves alpha open. Here it is 1 / (the largest eigenvalue of J J^T + a bound on the curvature of the path), so that no step
-    overshoots. Every step ends within the motors' limits. The path ends "stuck" when steps no longer move the marker: the target is out of
-    reach, limits block the motion, or the pose is singular.
+    The thesis leaves alpha open. Here it is 1 / (the largest eigenvalue of J J^T + `bend_bound`), so that no step overshoots. Every step
+    ends within the motors' limits. The path ends "stuck" when steps no longer move the marker: the target is out of reach, limits block the
+    motion, or the pose is singular.
 
     Args:
         model: the robot.
@@ -92,7 +92,7 @@ def reach_path(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MarkerError:
-    """The position of a marker in a pose, and what remains to its target; the radius of the target is ignored.
+    """The position of a marker in a pose, and its remaining error to the centre of its target.
 
     `position`: (3,) m, root frame, of the marker. `error`: (3,) m from marker to target; with a wanted normal (6,), where the last three
     are ARM (0.1 m) times the cross product of the marker's normal and the wanted normal. `angle`: rad, between the normals; 0 without a
@@ -115,7 +115,7 @@ class MarkerError:
 
 
 def marker_error(model: Model, marker: str, target: ReachTarget, q: Array) -> MarkerError:
-    """Return the position of a marker at q (n,) rad, and its remaining error to a target."""
+    """Return the position of a marker at q (n,) rad, and its remaining error to the centre of a target."""
     pose = model.evaluate(q)
     position = pose.position(marker)
     wanted, apart = target.normal, target.position - position
@@ -130,15 +130,17 @@ def marker_error(model: Model, marker: str, target: ReachTarget, q: Array) -> Ma
 
 
 def bend_bound(jacobian: Array, error: Array) -> float:
-    """Return an upper bound on the stiffness [m^2 per rad^2] that the curvature of the marker's path adds to a pull by J^T error.
+    """Return an upper bound on how much the curvature of the marker's path changes the second derivative of |e|^2 / 2 [m^2 per rad^2].
 
-    For a joint i nearer to the base than a joint j, the second derivative of the marker's position is the cross product of the axis of i
-    and the linear column of j. For a position the bound is therefore the product of three norms: of the error, of all linear columns, and
-    of all axes. For a rotation it is ARM (0.1 m) times the norm of the error times the squared norm of all axes.
+    e is the error. Along a unit vector v (n,) of motor motions this second derivative is |J v|^2 - e . x'', where x'' is the second
+    derivative of the marker's position along v; the bound is on |e . x''|, for all v. For a joint i nearer to the base than a joint j, the
+    second derivative of the position by both is the cross product of the axis of i and the linear column j of J. So the bound is the norm
+    of the position's error times the Frobenius norms of the linear and of the angular rows of J. With a rotation, ARM (0.1 m) times the
+    norm of its error times the squared Frobenius norm of the angular rows is added.
 
     Args:
-        jacobian: (6, n), linear rows first.
-        error: (3,) m, or (6,) m with a rotation times ARM as the last three.
+        jacobian: (6, n), the Jacobian J of the marker, linear rows first.
+        error: (3,) m, e, from marker to target; or (6,) m, where the last three are ARM times the error of the rotation.
     """
     levers, axes = np.linalg.norm(jacobian[:3]), np.linalg.norm(jacobian[3:])
     return float(np.linalg.norm(error[:3]) * levers * axes + ARM * np.linalg.norm(error[3:]) * axes * axes)
@@ -154,9 +156,9 @@ class Reacher:
     """Pulls a marker of a controlled robot to a target; call `update` once per tick, and `stop` at the end.
 
     The pull begins when the object is made. All motors that move the marker take part, also those of the torso. The controller's forces
-    keep the robot away from obstacles. With the published gains the springs of the attractor pull back during the reach, so that the marker
-    stops before the target. A controller has at most one reach of the whole body: a new `Reacher` replaces the previous one. To reach with
-    two hands at the same time use `Controller.reach_toward` with their parts.
+    keep the robot away from obstacles. With the gains of 2014 (`Gains.published_2014`) the springs of the attractor pull back during the
+    reach, so that the marker stops before the target. A controller has at most one reach of the whole body: a new `Reacher` replaces the
+    previous one. To reach with two hands at the same time use `Controller.reach_toward` with their parts.
     """
 
     __slots__ = ("_best", "_controller", "_marker", "_seen", "_since", "_tolerance", "angle", "distance", "target")

@@ -55,7 +55,7 @@ class Reaching:
 
 
 class Reaches:
-    """The reaches in progress by part: at most one for each part, and one of the whole body (None)."""
+    """The reaches in progress: at most one for each part, and at most one of the whole body, which has None in place of a part."""
 
     __slots__ = ("_addresses", "_chains", "_core", "_law", "_robot", "_under_way", "address")
 
@@ -89,7 +89,7 @@ class Reaches:
             self._list()
 
     def marker(self, part: str | None) -> str | None:
-        """Return the marker that a part (None: the whole body) reaches with; None if there is no such reach."""
+        """Return the name of the marker with which a part (None: the whole body) reaches; None if there is no such reach."""
         reaching = self._under_way.get(part)
         return None if reaching is None else reaching.marker
 
@@ -105,7 +105,7 @@ class Reaches:
     def is_approaching(self, part: str | None) -> bool:
         """Return whether the reach of a part (None: of the whole body) still moves its marker nearer to the target.
 
-        Always False under the published law, and without a reach.
+        Always False without a reach, and with the gains of 2014 (`Gains.published_2014`).
         """
         return bool(self._core.reach_is_approaching(self._law.address, self.address, len(self), _first(self._robot, part)))
 

@@ -71,9 +71,9 @@ TOLERANCE = float(np.deg2rad(1.0))  # rad; the safety gate allows the same beyon
 class Violation:
     """One reason why a pose is not safe: a contact, a motor beyond its limit, or a clause (a constraint on several joints) that is broken.
 
-    `kind`: "contact", "limit" or "clause". `what`: the two volumes of a contact ("first - second"), the motor, or the part and number of
-    the clause. `depth`: depth of a contact in m; motion beyond a limit in rad (m for a motor that slides); for a clause the distance in rad
-    along the normal of its nearest row, a.q + b > 0, to the boundary of this row.
+    `kind`: "contact", "limit" or "clause". `what`: names of the two volumes of a contact ("first - second"), name of the motor, or part and
+    index of the clause. `depth`: depth of a contact in m; distance beyond a limit in rad (m for a motor that slides); for a clause, of
+    which one row a.q + b > 0 must hold, the distance in rad to the nearest position at which a row holds.
     """
 
     kind: Literal["contact", "limit", "clause"]
@@ -127,8 +127,9 @@ class Recovery:
     """One recovery by the reflex, in progress or ended: the robot retraces recent poses after a violation.
 
     `cause`: the violations at the start. `ticks`: duration in ticks. `deepest`: m, largest depth of a contact during the recovery. `again`:
-    how often a violation was over and came back. `passed`: number of waypoints (poses that count as safe) at which the recovery did not
-    stop, because the pose was in violation. `outcome`: "under way", or why the recovery ended: "waypoint", "end of history" or "stuck".
+    how often a violation was over and came back. `passed`: number of waypoints (poses that count as safe) at which the recovery continued,
+    because the pose had a violation. `outcome`: "under way", or where the recovery ended: "waypoint", "end of history" (the oldest recorded
+    pose), or "stuck" (it failed).
     """
 
     cause: tuple[Violation, ...]
@@ -154,9 +155,9 @@ class Counts:
 
 
 class Debounce:
-    """A filter for a signal with two values: its output changes after the input has differed from it for some ticks without a break.
+    """A filter for a signal that is True or False: its output changes after the input has differed from it for some consecutive ticks.
 
-    It is used as in thesis 4.4. `on` is the present output.
+    It is used as in thesis 4.4. `on`: the present output.
     """
 
     def __init__(self, confirm: int, release: int) -> None:
@@ -179,8 +180,8 @@ class Reflex:
     State "forward": the client commands, and poses are recorded; a confirmed violation changes to "brake". State "brake": the robot stops;
     the time `brake` later, the state changes to "rewind". State "rewind": the target moves back along the recorded poses, to a waypoint (a
     pose that counts as safe, see `mark`) or to the oldest pose; then the state changes to "dead". State "dead": the robot waits for the
-    time `dead_time`. Then, if the pose is without violation, the state changes to "forward"; otherwise to "rewind", or to "stuck" if no
-    recorded pose is left. State "stuck" ends when the pose is without violation, or by `accept`.
+    time `dead_time`. Then, if the pose is without violation or need not be (`must_be_clear`), the state changes to "forward"; otherwise to
+    "rewind", or to "stuck" if no recorded pose is left. State "stuck" ends when the pose is without violation, or by `accept`.
     """
 
     def __init__(self, settings: ReflexSettings, dt: float, max_velocity: Array) -> None:
@@ -223,9 +224,10 @@ class Reflex:
         return True
 
     def accept(self, q: Array, violations: Sequence[Violation]) -> None:
-        """Return control to the client in state "stuck", by the client's decision; in other states nothing happens.
+        """Return control to the client in state "stuck", although the pose has violations; in other states nothing happens.
 
-        `q`: (n,) rad, measured pose. `violations`: the violations of this pose; they are ignored until a pose had no violation at all.
+        `q`: (n,) rad, measured pose. `violations`: the violations of this pose; later calls of `tick` ignore them until a pose has had no
+        violation at all.
         """
         if self.state != "stuck":
             return
@@ -251,7 +253,7 @@ class Reflex:
         return None if self.state == "forward" else self._target
 
     def give_up(self) -> None:
-        """Change to state "stuck", because the robot does not follow the reflex. Without a recovery in progress nothing happens."""
+        """Change to state "stuck"; call this if the robot does not follow the reflex. Without a recovery in progress nothing happens."""
         if self.state not in ("forward", "stuck") and self.recovery is not None:
             self._end_stuck(self.recovery)
 

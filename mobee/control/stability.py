@@ -18,9 +18,10 @@ from mobee.robot.robot import Robot
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """The largest stable time step of the control law, and the motion of the motors that becomes unstable at a larger step.
+    """The largest stable time step of the control law, and the combined motion of motors that becomes unstable first.
 
-    `step`: s. `motor`: the motor with the largest share of that motion. `damping` 1/s and `stiffness` 1/s^2: of the law along that motion.
+    `step`: s. `motor`: name of the motor with the largest share of that motion. `damping` [1/s], `stiffness` [1/s^2]: of the law along
+    that motion.
     """
 
     step: float
@@ -56,10 +57,10 @@ def require_stable(robot: Robot, gains: Gains, dt: float) -> None:
 def stability_bound(robot: Robot, gains: Gains) -> Bound:
     """Compute the largest stable time step if all springs (attractor, limits, all clauses) have their largest stiffness at the same time.
 
-    With the diagonal damping C and the stiffness K of all motors a step of dt is stable while 4 - 2 dt C - dt^2 K is positive definite:
-    with s = 1/dt the bound is the largest s for which 4 s^2 - 2 s C - K is singular. The bound does not include contacts: their stiffness
-    depends on the pose and on their number, and their force is bounded. It also does not include the age of commands, whose effect depends
-    on the motors. docs/law.md has numbers for both.
+    C is the diagonal damping and K the stiffness of all motors. A step of dt is stable while 4 - 2 dt C - dt^2 K is positive definite, so
+    with s = 1/dt the bound is the largest s for which 4 s^2 - 2 s C - K is singular. Two effects are not included; docs/law.md has numbers
+    for both. Contacts: their stiffness depends on the pose and on their number, and their force is bounded. Delays of commands: their
+    effect depends on the motors.
     """
     moved = np.flatnonzero(gains.weight(robot.motors) > 0)
     if not len(moved):

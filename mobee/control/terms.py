@@ -21,10 +21,10 @@ _NAME = re.compile("[a-z][a-z0-9_]{0,63}")
 
 
 class State:
-    """The input of a user-defined force in one tick; arrays are read-only.
+    """The input of the function of a user-defined force in one tick; arrays are read-only.
 
-    `q`: (n,) rad, measured positions. `velocity`: (n,) rad/s, the control law's own velocity. `dt`: s, duration of the tick. `robot`: the
-    robot. `pose`: the robot at q in its world.
+    `q`: (n,) rad, measured positions. `velocity`: (n,) rad/s, of the control law's own state, not measured. `dt`: s, duration of the tick.
+    `robot`: the robot. `pose`: the robot at q in its world.
     """
 
     __slots__ = ("_evaluate", "_pose", "dt", "q", "robot", "velocity")
@@ -36,7 +36,7 @@ class State:
 
     @property
     def pose(self) -> Pose:
-        """The robot at q in the present world, with its contacts. It is evaluated when it is read the first time."""
+        """The robot at q in the present world, with its contacts. It is computed when this property is read for the first time."""
         if self._pose is None:
             self._pose = self._evaluate()
         return self._pose
@@ -60,7 +60,7 @@ class Term:
             raise InvalidValue(f"term {self.name!r}: its function is {self.function!r}; it must be a function of the state.")
 
     def force(self, state: State) -> Array:
-        """Return the force of the function, (n,) rad/s^2.
+        """Call the function and return the force, (n,) rad/s^2, or m/s^2 for a motor that slides.
 
         Raises InvalidValue, with the name of the term, if the function fails or its result is not valid.
         """

@@ -31,9 +31,9 @@ def chains(robot: Robot) -> list[Chain]:
     """Return the chains of joints that can be arms or legs, in the order of the tree.
 
     A chain ends at a link without further joints, or at a hand. At a branching, a branch is short if it is shorter [m] than HAND (0.5)
-    times the chain up to there. If all branches are short, they are the fingers of a hand, and the chain ends there. Short branches beside
-    longer ones are ignored. If one branch is long, the chain continues in it (unless the chain has only one joint). Otherwise each long
-    branch begins a new chain, and the joints before the branching are a trunk, which belongs to no chain.
+    times the chain up to there, else long. If all branches are short, they are the fingers of a hand, and the chain ends there. If some
+    are long, the short ones are ignored. If exactly one is long, the chain continues in it (unless the chain has only one joint). Otherwise
+    each long branch begins a new chain, and the joints before the branching are a trunk, which belongs to no chain.
     """
     tree = _Tree(robot)
     found: list[Chain] = []
@@ -109,7 +109,7 @@ def corners_of(shape: Shape) -> Array:
 
 
 def end_point(robot: Robot, chain: Chain) -> Array:
-    """Return the end point of a chain, (3,) m, root frame at zero pose, whose motion is measured.
+    """Return the end point of a chain, (3,) m, root frame at zero pose, for measuring how far the joints move the end.
 
     It is the mean position of the solids of the last link and its hand; without solids, of their markers; without markers, of the joints of
     the hand, else the last joint of the chain.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Narrower limits of motors, and clauses, for solids that are too near each other for fields: they keep these solids apart.
+"""Adds motor limits and clauses (conditions on motor positions) that keep solids apart which are too near each other for fields.
 
 Whether two links with few joints between them touch depends only on the motors between them.  From the space of these motors, half-spaces
 are cut off until no sampled position is left in which the links touch. A half-space along a single motor becomes a limit of this motor,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Derives from any robot what curious agents need: arms as parts, joints to learn, limits, home, tested pairs and fields."""
+"""Derives from any robot what curious agents need: arms as parts, joints to learn, limits, home, pairs tested for contacts, and fields."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ LEFT_OUT = "solids that touch in most poses, or in every home that was tried"
 
 @dataclass(frozen=True, slots=True)
 class Arm:
-    """An arm that learns.
+    """An arm with which a curious agent learns.
 
-    `part`: name of its part. `motors`: names of the motors of its chain. `joints`: names of the motors that are learned; the states of the
-    arm are a lattice of their positions. `movement`: m, how far the best motor moves the end of the arm over its range; 0 for an arm that
-    the caller of `derive` requested.
+    `part`: name of its part. `motors`: names of all motors of the arm. `joints`: names of those motors whose positions are the states of
+    the agent, in a lattice. `movement`: m, how far the best motor moves the end of the arm over its range; 0 for an arm that the caller of
+    `derive` requested.
     """
 
     part: str
@@ -44,12 +44,12 @@ class Arm:
 class Derived:
     """A robot that curious agents can use at once, and the derived values.
 
-    `arms`: the arms that learn. `limited`: names of motors that had a range of a turn or more and got half a turn to each side.
-    `home_moved`: names of motors whose home was moved, so that no solids touch at home and fields (volumes that cause repulsive forces) do
-    not overlap. `narrowed`: names of motors with a narrower range, because beyond it solids touch that fields cannot keep apart; clauses,
-    conditions that were added to the robot, do the same for combinations of several motors. `left_out`: names of the pairs of links that
-    are no longer tested for contacts. `field`: width of the fields that were added [m], 0: none. `gains`: gains of the control law:
-    `Gains.derived()`, or the default ones for a robot that has its own fields.
+    `robot`: the robot with all changes. `arms`: the arms that learn. `limited`: names of motors that had a range of a turn or more, which
+    is now half a turn to each side. `home_moved`: names of motors whose home was moved, so that no solids touch at home and fields (volumes
+    that cause repulsive forces) do not overlap. `narrowed`: names of motors with a narrower range; beyond it solids touch that fields
+    cannot keep apart. For combinations of several motors, clauses (conditions on motor positions) were added to the robot instead.
+    `left_out`: pairs of names of links that are no longer tested for contacts. `field`: width of the fields that were added [m], 0: none.
+    `gains`: gains of the control law: `Gains.derived()`, or the default ones for a robot that has its own fields.
     """
 
     robot: Robot
@@ -64,7 +64,7 @@ class Derived:
     def rest(self, arm: Arm) -> tuple[float, ...]:
         """Return the home of each motor of the arm's part as a fraction of the motor's range, 0 (lower limit) to 1 (upper limit).
 
-        The motors of the part that are not learned stay there.
+        The motors of the part that are not in `arm.joints` stay there while the agent learns.
         """
         part = self.robot.parts[arm.part]
         low, high = self.robot.limits[part.slice].T
@@ -76,15 +76,15 @@ class Derived:
 
 
 def derive(robot: Robot, parts: Mapping[str, Sequence[str]] | None = None, seed: int = 0) -> Derived:
-    """Derive arms, joints to learn, limits, home, tested pairs and fields of a robot.
+    """Derive arms, joints to learn, limits, home, pairs of links that are tested for contacts, and fields of a robot.
 
-    The fields are volumes around the solids that cause repulsive forces. A robot with more than one part keeps its parts; a robot that has
+    Fields are volumes around the solids that cause repulsive forces. A robot with more than one part keeps its parts; a robot that has
     fields keeps its fields, its tested pairs and its home.
 
     Args:
         robot: any robot.
-        parts: name of each part that should learn -> the names of its motors to learn; None: they are derived. A part that the robot does
-            not have is made of these motors.
+        parts: dict from the name of each part that should learn to the names of its motors whose positions are the states; None: they are
+            derived. A part that the robot does not have is made of these motors.
         seed: seed of the random poses in which contacts and movements are measured.
 
     Raises:

@@ -23,8 +23,8 @@ TURN = 2.0 * np.pi
 def bounded(robot: Robot) -> tuple[Robot, list[str]]:
     """Limit every motor whose range is a turn or more to half a turn to each side; return the robot and the names of the changed motors.
 
-    In a larger range different motor positions are the same pose, so that different states of a lattice would be the same pose too. The
-    middle of the range is 0, or home if home is not within half a turn of 0.
+    With a larger range, positions one turn apart are the same pose, so that several states of a lattice would be the same pose. The middle
+    of the new range is 0, or home if home is not within half a turn of 0.
     """
     changed = [motor.name for motor in robot.motor_table if np.ptp(motor.limits) >= TURN - 1e-6 and not slides(robot, motor)]
     table = []
@@ -79,10 +79,10 @@ def movements(robot: Robot, chain: Chain, motors: Sequence[int], seed: int) -> A
 
 
 def joints_to_learn(robot: Robot, motors: Sequence[int], moved: Array) -> tuple[str, ...]:
-    """Return the names of the motors that move the end of an arm most, at most MOST_JOINTS (4), in the given order.
+    """Return the names of the motors that move the end of an arm most, at most MOST_JOINTS (4), in the order of `motors`.
 
-    `motors`: indices of the k motors. `moved`: (k,) m, how far each motor moves the end; motors below 10 % of the largest value are left
-    out.
+    `motors`: indices of the k motors of the arm. `moved`: (k,) m, how far each motor moves the end; motors below 10 % of the largest value
+    are left out.
     """
     best = [k for k in np.argsort(-moved, kind="stable")[:MOST_JOINTS] if moved[k] >= LEAST_SHARE * moved.max()]
     return tuple(robot.motors[motors[k]] for k in sorted(best))

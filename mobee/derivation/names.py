@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Names of parts, from the words that the names of their motors have in common."""
+"""Chooses names of parts, from the words that the names of their motors have in common."""
 
 from __future__ import annotations
 

@@ -45,9 +45,9 @@ def without_links(robot: Robot, pairs: Collection[LinkPair], reason: str) -> Rob
 
 
 def often_touching(robot: Robot, seed: int, share: float = OFTEN) -> set[LinkPair]:
-    """Return the pairs of links (indices) of which two solids touch in more than the fraction `share` of random poses.
+    """Return the pairs of links (as sets of two indices) with solids that touch in more than the fraction `share` of random poses.
 
-    `seed`: of the poses.
+    `seed`: seed of the poses.
     """
     counts = _counted(replace(robot, field_pairs=robot.field_pairs[:0]), seed)
     links: Counter[LinkPair] = Counter()
@@ -105,8 +105,9 @@ def can_cut(robot: Robot, links: LinkPair) -> bool:
 def free_home(robot: Robot, seed: int) -> tuple[Array, set[LinkPair]]:
     """Return a home (n,) near the robot's home in which as few solids as possible touch, and the pairs of links that still touch.
 
-    Positions are in the units of the motors, rad or m. Only the motors between links that touch are moved: to random positions, in a range
-    about the best position so far that grows in each round of the search. `seed`: seed of the random positions.
+    Positions are in the units of the motors, rad or m. Pairs of links are sets of two indices. Only the motors between links that touch are
+    moved: to random positions, in a range about the best position so far that grows in each round of the search. `seed`: seed of the random
+    positions.
     """
     solids = replace(robot, field_pairs=robot.field_pairs[:0])
     model, rng = Model(solids), np.random.default_rng(seed)
@@ -168,7 +169,8 @@ def with_fields(robot: Robot, pairs: Ints, width: float, seed: int, short: float
     `pairs`: (p, 2) indices of shapes, the pairs of solids that fields should keep apart. `width`: m, distance by which fields extend beyond
     the solids. A pair gets fields of the full width, or else of 1/2, 1/4 or 1/8 of it. A width is not used for a pair whose fields would
     overlap at home or in more than FIELD_OFTEN (60 %) of random poses. It is also not used if limits and clauses can keep the pair apart,
-    and its contacts have levers shorter than `short` times the robot's least lever. `seed`: seed of the random poses.
+    and the median lever of its contacts (the change of the depth if the motors move by 1 rad) is shorter than `short` times the robot's
+    least lever. `seed`: seed of the random poses.
     """
     for suffix, size in SIZES.items():
         robot, pairs = _with_fields(robot, pairs, size * width, suffix, seed, short)
@@ -176,9 +178,9 @@ def with_fields(robot: Robot, pairs: Ints, width: float, seed: int, short: float
 
 
 def home_apart(robot: Robot, reach: float, seed: int) -> Array:
-    """Return a home (n,) near the robot's home in which no solids touch and fields of half the usual width do not overlap.
+    """Return a home (n,) near the robot's home in which no solids touch and fields of half the usual width would not overlap.
 
-    Fields are volumes that cause repulsive forces. If no such home is found, it is the one with the fewest contacts that was found.
+    Fields are volumes that cause repulsive forces. If no such home is found, the one with the fewest contacts is returned.
     Positions are in the units of the motors, rad or m. `reach`: m, length of the robot's longest arm. `seed`: seed of the random search.
     """
     width = AT_HOME * field_width(reach)

@@ -24,12 +24,12 @@ class EnvPlant(InstantPlant):
 
     If an episode terminates, its last state is a state like any other: every action there leads to the first observation of the next
     episode, and the agent learns this. If an episode is truncated, the next action raises ActionInterrupted, as on a robot that was
-    stopped. The agent must then measure the first state of the new episode, and so learns no wrong transition; `agent.run` does this.
+    stopped. The agent must then measure the first state of the new episode, so that it learns no wrong transition; `agent.run` does this.
 
     Args:
-        env: its observations and actions must be Discrete; wrap other environments first, for example by position.
-        seed: of the first reset.
-        goals: (S, A) the state to which each action is expected to lead; None: not known, the state itself (see `DiscreteSpace`).
+        env: the environment; its observations and actions must be Discrete, so wrap other environments first.
+        seed: seed of the first reset.
+        goals: (S, A) the state to which each action is expected to lead; None: not known, then the state itself (see `DiscreteSpace`).
 
     Raises:
         InvalidValue: observations or actions are not Discrete.
@@ -80,8 +80,8 @@ class EnvPlant(InstantPlant):
     def act(self, part: str, target: Array) -> Outcome:
         """Make one step of the environment and return its outcome; a step counts as 1 s.
 
-        `part`: must be `space.part`. `target`: (2,), from `space.aim`: the expected state and the action. Raises ActionInterrupted, without
-        this action, if the last step truncated the episode: a new episode has begun.
+        `part`: must be `space.part`. `target`: (2,), from `space.aim`: the expected state and the action. If the last step truncated the
+        episode, the action is not made, a new episode begins, and ActionInterrupted is raised.
         """
         self._check_part(part)
         action = self.space.action_of(target)

@@ -37,7 +37,7 @@ class LatticeTask(Settings):
     Args:
         robot: name of a shipped robot, path of an XML or URDF file, or a Robot.
         joints: motor names, all of one part.
-        levels: fractions of each joint's range at which the samples are, see `mobee.Lattice`.
+        levels: fractions of each joint's range; the samples (points of the lattice) are at all combinations of them, see `mobee.Lattice`.
         neighbours: number of neighbours to which each state has actions; "equidistant": the neighbours one level away along one joint;
             None: 16, or all others if there are fewer.
         tie_seed: seed of the random choice among equally near neighbours. It defines the space; the seed of `reset` defines the noise.
@@ -131,13 +131,13 @@ class _Arm:
 class LatticeEnv(Env[Any, Any]):
     """A Gymnasium environment: a part of a robot on a lattice. A step is a whole action, until the part has settled or timed out.
 
-    Observation: the state, the number of a cell of the lattice. Action a sets the attractor to the sample of the a-th neighbour of the
-    state, neighbours in ascending order. `info["action_mask"]` is 1 for the actions that the present state has; any other action moves
-    nothing and takes no time. A contact, a cable or a limit may stop the part in another state. `info` has the outcome: `q` (n_part,) rad
-    by the encoders, `settled`, `duration` in s, `touched` (names of world objects in contact at the end), and `valid` (False if the state
-    did not have the action).
+    Observation: the state, the number of a cell of the lattice. Action a sets the attractor to the sample (the lattice point) of the a-th
+    neighbour of the state, neighbours in ascending order. `info["action_mask"]` is 1 for the actions that the present state has; any other
+    action moves nothing and takes no time. A contact, a cable or a limit may stop the part in another state. `info` has the outcome: `q`
+    (n_part,) rad by the encoders, `settled`, `duration` in s, `touched` (names of world objects in contact at the end), and `valid` (False
+    if the state did not have the action).
 
-    `reset` puts the robot at home; with `options={"state": s}` it moves to that state first, and may end elsewhere.
+    `reset` puts the robot at home; with `options={"state": s}` it then moves to that state, but an obstacle may stop it in another one.
 
     Args:
         render_mode: "rgb_array", or None: no pictures.
@@ -174,7 +174,7 @@ class LatticeEnv(Env[Any, Any]):
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[int, dict[str, Any]]:
         """Put the robot at home and return its state and info; `seed` determines the noise of this and all later episodes.
 
-        `options={"state": s}`: move to that state first. Raises InvalidValue if there is no such state.
+        `options={"state": s}`: the robot then moves to that state, before its state is read. Raises InvalidValue if there is no such state.
         """
         super().reset(seed=seed)
         info = self._arm.restart(self.np_random, options)
@@ -233,7 +233,8 @@ class LatticeVectorEnv(RobotVectorEnv):
     ) -> tuple[Ints, dict[str, Any]]:
         """Put all robots at home and return their states (num_envs,) and infos.
 
-        `seed`: a list with one seed for each robot, or the first of consecutive seeds. `options={"state": s}`: move to that state first.
+        `seed`: a list with one seed for each robot, or the first of consecutive seeds. `options={"state": s}`: all robots then move to that
+        state, before their states are read.
         """
         self._restart_all(seed)
         infos: dict[str, Any] = {}

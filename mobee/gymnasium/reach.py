@@ -130,7 +130,7 @@ class _Reaching:
 def extent(robot: Robot, marker: str) -> float:
     """Return an upper bound [m] on the distance of the marker from the origin of the root frame.
 
-    It is the sum of the lengths, and of the largest strokes, of the chain from the base to the marker.
+    It is the length of the path from the origin, from joint to joint, to the marker, plus the largest strokes of the sliding joints.
     """
     point, link, total = robot.markers[marker].position, robot.markers[marker].link, 0.0
     while link > 0:
@@ -153,9 +153,9 @@ class ReachEnv(Env[Any, Any]):
     root frame. A goal is the position of the marker in a random posture in which no force acts on the joints. An episode never terminates;
     an environment that was made by its id truncates it after 50 steps.
 
-    `info["is_success"]`: whether the marker is at the goal now. `info["solid_depth"]` and `info["field_depth"]`: m, the deepest contact of
-    solids and of fields during the step, 0 without a contact. Contacts of the robot's solids with the world always count; contacts between
-    solids of two links count only if the fields of these links are tested for contacts too.
+    `info["is_success"]`: whether the marker is at the goal now. `info["solid_depth"]` and `info["field_depth"]`: m, depth of the deepest
+    contact of solids and of fields during the step, 0 without a contact. Contacts of the robot's solids with the world always count;
+    contacts between solids of two links count only if the fields of these links are tested for contacts too.
 
     `reset` puts the robot at home and draws a goal, or takes `options={"goal": (x, y, z)}`, m, root frame.
 
@@ -205,9 +205,10 @@ class ReachEnv(Env[Any, Any]):
         return seen, float(reward), False, False, {"is_success": bool(reached), "solid_depth": float(solid), "field_depth": float(field)}
 
     def compute_reward(self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: Any = None) -> Any:
-        """Return the rewards (...) for reached positions and targets, (..., 3) m each, as hindsight experience replay needs them.
+        """Return the rewards for any positions of the marker and goals, as hindsight experience replay needs them.
 
-        `achieved_goal`: positions of the marker. `desired_goal`: positions of the target. `info`: not used.
+        `achieved_goal`: positions of the marker, (..., 3) m, root frame. `desired_goal`: goals, (..., 3) m. `info`: not used. The result
+        has shape (...).
         """
         return self._reaching.judge(np.asarray(achieved_goal), np.asarray(desired_goal))[0]
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the environments share: loading of robots and worlds, settings of plants, and pictures."""
+"""Code that the environments share: loading of robots and worlds, settings of plants, and pictures."""
 
 from __future__ import annotations
 
@@ -52,11 +52,11 @@ def model_of(robot: RobotFile, world: WorldFile) -> Model:
 
 @per_robot
 def guarded(robot: Robot) -> Robot:
-    """Return a copy of the robot in which only those pairs of solids are tested for contacts that fields keep apart.
+    """Return a copy of the robot in which a pair of solids is tested for contacts only if fields keep the pair apart.
 
-    A field is a shape around a link; its contacts cause repulsive forces. A pair of solids remains if the fields of their links are tested
-    against each other; a link without fields, such as a finger, counts as the next link towards the base that has fields. For example, the
-    pair of upper arm and pelvis of the iCub is removed: their hulls overlap when the arm is beside the body.
+    A field is a shape around a link; its contacts cause repulsive forces. The test of a pair of solids remains if the fields of their links
+    are tested against each other; a link without fields, such as a finger, counts as the next link towards the base that has fields. For
+    example, upper arm and pelvis of the iCub are no longer tested: their hulls overlap when the arm is beside the body.
     """
     with_field = {shape.link for shape in robot.shapes if shape.role == "field"}
     guard = list(range(len(robot.links)))
@@ -71,7 +71,7 @@ def guarded(robot: Robot) -> Robot:
 def plant_settings(given: PlantSettings | None, parts: Sequence[str]) -> PlantSettings:
     """Return the settings of a plant: `given`, or, if this is None, the default settings with ticks of 20 ms.
 
-    `parts`: names of the parts that become active, that is, that the plant may move, if the settings do not name active parts.
+    `parts`: names of the parts that the plant may move, if the settings do not name such parts (`active`).
     """
     settings = PlantSettings(dt=TICK) if given is None else given
     return settings if settings.active is not None else replace(settings, active=tuple(parts))

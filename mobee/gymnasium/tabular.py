@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Gymnasium environments of worlds that are given as tables of outcomes, probabilities and rewards."""
+"""Gymnasium environments of small worlds (MDPs) that are given as tables of outcomes, probabilities and rewards."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from mobee.learning.tabular import TabularWorld, deep_sea, river_swim
 
 
 class TabularEnv(Env[Any, Any]):
-    """A Gymnasium environment from tables; the observation is the state, and every episode starts in state 0.
+    """A Gymnasium environment of an MDP in tables; the observation is the state, and every episode starts in state 0.
 
     Args:
         world: the tables of outcomes, probabilities and rewards; every state has all actions.

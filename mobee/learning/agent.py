@@ -186,17 +186,17 @@ class ConcurrentPlant(Plant, Protocol):
     """A plant that can perform actions of several parts at the same time."""
 
     def begin(self, part: str, target: Array) -> None:
-        """Start an action of a part, without waiting for its end. `target`: (n_part,) rad, where the attractor is set."""
+        """Start an action of a part, without waiting for its end. `target`: (n_part,) rad, the pose at which the action aims."""
 
     def advance(self) -> list[tuple[str, Outcome]]:
-        """Run until at least one action has ended; return (part, outcome) of each action that has ended."""
+        """Run the plant until at least one action has ended; return (part, outcome) of each action that has ended."""
 
 
 def run(agents: Sequence[CuriousAgent], transitions: int) -> None:
     """Run agents of different parts at the same time on one plant until they have made `transitions` more transitions in total.
 
-    No further action is started after that number, so at the end every part has settled and every transition was observed. Raises
-    InvalidValue unless each agent has its own part and all have the same plant, a `ConcurrentPlant`.
+    Exactly that many actions are started, so at the end all actions have ended and every transition was observed. Raises InvalidValue
+    unless each agent has its own part and all have the same plant, a `ConcurrentPlant`.
     """
     plant = _common_plant(agents)
     waiting, begun, ended = list(agents), 0, 0

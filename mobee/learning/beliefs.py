@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a learner believes about the outcomes of its actions, and whether it can predict them."""
+"""The probability and the surprise of an outcome in a learner's model, and when a learner can predict the outcome of an action."""
 
 from __future__ import annotations
 

@@ -28,7 +28,8 @@ class DiscreteSpace(Space):
     Args:
         states: number of states, at least 2.
         actions: number of actions of each state, at least 1.
-        goals: (S, A) the state to which each action is expected to lead; None: not known, the state itself.
+        goals: (S, A) the state to which each action is expected to lead; None: not known; the goal of each action is then the state in
+            which it starts.
         name: name of the robot and of its only part.
 
     Raises:
@@ -59,7 +60,7 @@ class DiscreteSpace(Space):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The numbers of states and actions, and a digest of the space, as JSON values."""
+        """The numbers of states and actions, and a hash of the space, as JSON values."""
         return self._made | {"kind": "discrete", "states": len(self), "actions": self.goals.shape[1]}
 
     def _cell(self, q: list[float]) -> int:

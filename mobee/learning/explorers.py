@@ -53,7 +53,7 @@ transition. Everything else in the scores must depend only on the agent's settin
 
 @dataclass(frozen=True, slots=True)
 class SampledBeliefs:
-    """A transition model that was drawn at random from the posterior: `outcomes` and their `probabilities`, (S, A, B)."""
+    """A transition model that was drawn at random from the posterior: `outcomes` (states) and their `probabilities`, each (S, A, B)."""
 
     outcomes: Ints
     probabilities: Array
@@ -99,14 +99,16 @@ HORIZONS = 2.0  # length of the simulated plan, in units of 1 / (1 - discount)
 
 
 def depleting(agent: Explorable, state: int, rng: np.random.Generator) -> Array:
-    """Score actions by the discounted sum of expected information gains; among equal actions, by the gains that remain afterwards.
+    """Score actions by the discounted sum of expected information gains; if scores are equal, by the gains that remain afterwards.
 
-    The explorer `curious` plans with the gain of the last observation of each state-action. This explorer plans with the expected gain of
-    the next observation, under the outcome probabilities of `TransitionModel.debiased`; it decreases sooner if the outcome of an action is
-    certain. For an action that was never tried it is the gain of an imagined success. If several actions have equal scores, the best plan
-    is simulated through its most probable outcomes, and the gains of the actions in it are reduced as if these were observed. A second plan
-    computes the value of the remaining gains, which decides: a state with one untried action is worth less than a state with sixteen. Both
-    plans use the agent's beliefs. Raises InvalidValue if the agent's divergence is neither "kail" nor "kl".
+    The explorer `curious` plans with the gain of the last observation of each state-action. This explorer plans with the gain that is
+    expected of the next observation, under the outcome probabilities of `TransitionModel.debiased`. If the outcome of an action is certain,
+    this expected gain decreases sooner. For an action that was never tried, it is the gain of an imagined success.
+
+    If several actions have nearly equal scores, the best plan is simulated through its most probable outcomes, and the gains of its actions
+    are reduced as if these outcomes were observed. The remaining gains are the rewards of a second plan, whose action values decide. In it,
+    a state with one untried action is worth less than a state with sixteen. Both plans use the agent's beliefs. Raises InvalidValue if the
+    agent's divergence is neither "kail" nor "kl".
     """
     model, actions = agent.model, len(agent.model.space.actions(state))
     if model.divergence not in DIVERGENCES:
@@ -146,9 +148,9 @@ TIE_MARGIN = 1e-12  # scores that differ by less are a tie
 
 
 def curious(agent: Explorable, state: int, rng: np.random.Generator) -> Array:
-    """Score actions by the discounted sum of rewards in a plan for information gain, or for the agent's goal (thesis Algorithm 8).
+    """Score the actions of `state` by their values in a plan for information gain, or for the agent's goal (thesis Algorithm 8).
 
-    Scored are the actions of `state`; `rng` is not used.
+    The value of an action is the expected discounted sum of rewards. `rng` is not used.
     """
     return agent.plan()[1][state, : len(agent.model.space.actions(state))]
 
@@ -197,10 +199,10 @@ def choose(scores: Array, rng: np.random.Generator) -> int:
 
 
 class Draws:
-    """Random generators for numbered decisions: the random numbers depend only on a seed, a name and a number.
+    """Random generators for numbered decisions: the random numbers of a decision depend only on a seed, a name and its number.
 
-    It uses one generator, whose state is set for each number; this takes a tenth of the time of making a generator. `name`: two objects
-    with different names give different random numbers for the same seed.
+    All decisions share one generator, whose state is set for each decision, because making a generator takes ten times as long. `name`: two
+    objects with different names give different random numbers for the same seed.
     """
 
     def __init__(self, name: str) -> None:

@@ -23,8 +23,8 @@ class External:
 
     Args:
         space: the states and actions.
-        goal: target states, in which all actions have reward 1; or rewards of shape (S, A); or a function of state, action and goal state
-            of the action that returns the reward.
+        goal: target states, in which all actions have reward 1 (in all others 0); or rewards of shape (S, A); or a function of state,
+            action and goal state of the action that returns the reward.
         weight: the external reward times this factor is added to the intrinsic reward; None: it replaces the intrinsic reward.
 
     Raises:
@@ -57,7 +57,7 @@ class External:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """A digest of the rewards, and their weight, for the record of a run, as JSON values."""
+        """A hash of the rewards, and their weight, for the record of a run, as JSON values."""
         return {"digest": hashlib.sha256(self.reward.tobytes()).hexdigest()[:16], "weight": self.weight}
 
 

@@ -12,7 +12,7 @@ from mobee.plant import Outcome
 
 
 class InstantPlant(ABC):
-    """A plant of one part without motion in time: an action ends in the call of `act`, and counts as 1 s.
+    """A plant of one part that simulates no motion: an action ends in the call of `act`, and counts as 1 s.
 
     `begin` only stores the target; `advance` then calls `act`. So `mobee.learning.agent.run` can use the plant too.
     """

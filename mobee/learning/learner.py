@@ -33,7 +33,8 @@ class CuriousSettings(Settings):
             and two successes), see `TransitionModel`.
         divergence: the reward of an observation: "kail", "kl", a function, or the text `module:name` of one, see `TransitionModel`.
         forgetting: factor by which the counts of a state-action are multiplied before each new observation of it; 1 forgets nothing.
-        detector: "run_length": outcomes from before a detected change of the world are forgotten, see `TransitionModel`; "none": all count.
+        detector: "run_length": outcomes from before a detected change of the world are forgotten, see `TransitionModel`; "none": all
+            outcomes count.
         tolerance: a plan has converged if no value changes by this or more, see `value_iteration`.
         relative: True: the tolerance is in units of the largest reward, and each plan starts from the values of the previous one. False,
             with tolerance=1e-3: Algorithm 7 as published.
@@ -73,10 +74,11 @@ class _Made(NamedTuple):
 
 
 class Plans:
-    """Caches the plans made since the last transition, by name (`key`); a new plan starts from the values of the previous one of its name.
+    """Caches the plans made since the last transition, by name (`key`); a plan is the values of states (S,) and of actions (S, A).
 
-    `discount` and `tolerance`: as in `value_iteration`. `relative`: True: the tolerance is in units of the largest reward, and plans start
-    from earlier values; False: Algorithm 7 as published, with an absolute tolerance and all values 0 at the start.
+    `discount` and `tolerance`: as in `value_iteration`. `relative`: True: the tolerance is in units of the largest reward, and a plan
+    starts from the values of the previous plan of the same name; False: Algorithm 7 as published, with an absolute tolerance and all values
+    0 at the start.
     """
 
     def __init__(self, discount: float, tolerance: float, relative: bool) -> None:
@@ -117,7 +119,10 @@ class Plans:
         self._made.clear()
 
     def undo(self) -> None:
-        """Discard the present plans, because the action for which they were made was interrupted."""
+        """Discard the present plans, because the action for which they were made was interrupted.
+
+        Unlike after `keep`, their values are not the start of the next plans.
+        """
         self._made.clear()
 
 

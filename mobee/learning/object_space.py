@@ -94,7 +94,7 @@ class ObjectSpace(Space):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Postures, grid and name of the object, and a digest of the space, as JSON values.
+        """Postures, grid and name of the object, and a hash of the space, as JSON values.
 
         `mobee.learning.record.space_from` rebuilds the space from them.
         """

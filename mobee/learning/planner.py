@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plans from any state to target states with a learned model, compared with the shortest paths if every action reached its goal."""
+"""Plans paths from any state to target states with a learned model, and finds the shortest paths for comparison.
+
+A shortest path has the fewest actions if every action reaches its goal.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +46,7 @@ def shortest_actions(space: Space, beliefs: OutcomeModel, start: int, targets: I
 
 
 def passing(actions: dict[tuple[int, int], float]) -> dict[int, float]:
-    """Return a dict from each state to the probability of passing it, that is, of entering and leaving it by the most reliable actions.
+    """Return a dict from each state to the probability that the most reliable action into it and the most reliable one out of it succeed.
 
     `actions`: a dict from (state, goal state) of an action to its probability of success. The result for a state is the highest probability
     of the actions that lead to it, times the highest probability of the actions that start in it. States that lack either kind of action
@@ -88,9 +91,10 @@ class Plan:
     agent plans again after each action; infinite if it may come to a state without a known path. `shortest`: number of actions on a
     shortest path if every action reached its goal.
 
-    Two attributes explain why the path is longer than the shortest ones. `avoided`: states on shortest paths, but not on this path, with
-    the probability of passing each. `distrusted`: actions on shortest paths, as (state, goal state), with the probability of reaching the
-    goal. Both contain only probabilities below one half.
+    Two dicts explain why this path is longer than a shortest path. `avoided`: from each state that is on a shortest path, but not on this
+    path, to the probability that the agent can enter it and leave it again along the shortest paths (see `passing`). `distrusted`: from
+    each action on a shortest path, as (state, goal state), to the probability that the action ends in its goal. Both contain only states
+    and actions whose probability is below one half.
     """
 
     path: tuple[int, ...]
@@ -104,7 +108,7 @@ class Plan:
 
 
 class Planner:
-    """Finds the shortest reliable paths to target states: all actions cost the same, and a failed action must be repeated.
+    """Finds paths to target states that need few actions on average; an action that fails and must be repeated counts again.
 
     Args:
         space: states and actions.

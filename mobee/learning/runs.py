@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Change detection for the outcomes of each action: a posterior over the time since the outcomes changed, and the outcomes to forget.
+"""Change detection for the outcomes of each action: a posterior over the time since the outcomes changed, and counts since then.
 
 Bayesian online change point detection (Adams and MacKay 2007) for outcomes that are counted. A run is the time since the last change. The
-hazard, the probability of a change before a try, is not a setting: it is one of `HAZARDS` (0.1 to 0.0001), equally likely at first, and the
-outcomes of all actions inform about it.
+hazard, the probability of a change before a try, is not a setting: it is one of `HAZARDS` (0.1 to 0.0001), equally likely at first, and its
+probabilities are learned from the outcomes of all actions.
 """
 
 from __future__ import annotations
@@ -25,8 +25,9 @@ class Runs:
     """The R hypotheses about the present run of an action, the longest run first. A run is the time since the action's outcomes changed.
 
     `weight`: (R, H) probability of each run, given each of the H hazards (the probability of a change before a try) in HAZARDS. `counts`:
-    (R, B) number of each of the B outcomes since the run began. `suspected`: 0, or, if this action may have changed because a neighbouring
-    action did, the increase of the probability that the neighbour has changed; it is 0 again after the next try of this action.
+    (R, B) number of each of the B outcomes since the run began. `suspected`: above 0 if a neighbouring action seems to have changed, and
+    this action may have changed with it: by how much the probability of the neighbour's change has increased. It is 0 again after the next
+    try of this action.
     """
 
     weight: Array

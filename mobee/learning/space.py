@@ -98,8 +98,8 @@ class Space:
         """Return the state whose sample is nearest to a pose of the part, with distances in fractions of the joint ranges.
 
         `q`: rad, shape (n_part,): all motors of the part, as a plant measures them. If the space has fewer joints than the part has motors,
-        the joints alone are valid too, shape (d,), in the order of `joints`. On a border between states a lattice returns the lower one.
-        Raises InvalidValue for another shape or values that are not finite.
+        the joints alone are valid too, shape (d,), in the order of `joints`. On a border between states a lattice returns the state with
+        the lower number. Raises InvalidValue for another shape or values that are not finite.
         """
         given = real_array(f"q of {self.part}", q)
         if given.shape == self._targets.shape[1:]:
@@ -141,7 +141,7 @@ class Space:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The constructor's arguments and a digest of the space, as JSON values.
+        """The constructor's arguments and a hash of the space, as JSON values.
 
         `mobee.learning.record.space_from` rebuilds the space from them.
         """

@@ -22,8 +22,8 @@ SHORTCUT_SPAN = 4  # transitions on a path between the two states of a shortcut,
 def pruned(space: Space, transitions: Sequence[Transition], seen: int = MIN_ATTEMPTS) -> tuple[Space, Ints]:
     """Return the space without unreachable states, and the new number of each state, (S,), -1 for a removed state.
 
-    A state is unreachable if it was the goal of at least `seen` of the transitions, and no transition started or ended in it. States that
-    have no actions then are removed too. Raises InvalidValue if fewer than two states would remain.
+    A state is unreachable if it was the goal of at least `seen` of the transitions, and no transition started or ended in it. States whose
+    actions all lead to removed states are removed too. Raises InvalidValue if fewer than two states would remain.
     """
     aimed, reached = np.zeros(len(space), dtype=int), np.zeros(len(space), dtype=bool)
     for made in transitions:
@@ -46,10 +46,11 @@ def pruned(space: Space, transitions: Sequence[Transition], seen: int = MIN_ATTE
 
 
 def with_shortcuts(space: Space, transitions: Sequence[Transition], count: int, span: int = SHORTCUT_SPAN) -> Space:
-    """Return a space with more actions: between pairs of states that often followed each other on a path, and are no neighbours yet.
+    """Return a space with more actions: shortcuts between states that often followed each other within a few transitions.
 
-    `transitions`: from which the paths are taken. `count`: number of pairs, those that occurred most often; each is joined in both
-    directions. `span`: largest number of transitions between the two states of a pair.
+    `transitions`: the transitions of an agent, in order; consecutive ones form a path, from which loops are removed. `count`: number of
+    pairs of states that get a shortcut in both directions: the pairs that occurred most often on the path and have no action yet. `span`:
+    largest number of transitions on the path between the two states of a pair.
     """
     known = set(edges_of(space.goals))
     path: list[int] = []
@@ -69,8 +70,8 @@ def with_shortcuts(space: Space, transitions: Sequence[Transition], count: int, 
 def carried(transitions: Sequence[Transition], old: Space, new: Space) -> list[Transition]:
     """Convert transitions of the space `old` to the space `new`, which must have the same joints; return the converted transitions.
 
-    A transition is left out if `new` has no action between states with the same samples as its start and its goal. Its end state becomes
-    the state of `new` that contains the recorded pose. The transitions are numbered again from 1.
+    A transition is left out if `new` has no action between states with the same samples as its start and its goal. The end state of a
+    transition becomes the state of `new` that contains the pose recorded at its end. The transitions are numbered again from 1.
     """
     same = {state: new.state_of_joints(sample) for state, sample in enumerate(old.samples)}
     same = {before: now for before, now in same.items() if np.array_equal(old.samples[before], new.samples[now])}

@@ -29,8 +29,8 @@ NEGLIGIBLE = 1e-4  # a probability
 class TabularPlant(InstantPlant):
     """A plant for one part on which every action ends at once, at the sample of a state drawn from a table.
 
-    It is also an `OutcomeModel`: the true model of what an agent learns on this plant. The random choice of action number n depends only on
-    the seed and n; to continue a run in another object, set `state` and `actions`.
+    It is also an `OutcomeModel`: the true model of what an agent learns on this plant. The random choice of the n-th action depends only on
+    the seed and n. To continue a run in another object, set its attributes `state` and `actions` (the number of actions so far).
 
     Args:
         space: the states and actions.
@@ -192,7 +192,8 @@ def half_space(
         normal: normal of the plane, towards the forbidden side: one component for each joint, in fractions of its range.
         depth: position of the plane: 0: at the samples of the states farthest along the normal; 1: at those of the next states.
         memory: fraction of the distance from the goal to the start by which the outcome is shifted.
-        noise: standard deviation for each joint, in fractions of its range: of actions with a free goal, and of all others.
+        noise: standard deviation for each joint, in fractions of its range: first of actions whose goal is on the free side of the plane,
+            then of all others.
     """
     if len(normal) != len(space.joints) or not any(normal):
         raise InvalidValue(f"normal={normal!r}: give one component for each of {', '.join(space.joints)}, not all 0.")

@@ -221,9 +221,8 @@ class TransitionModel(Tabled):
 
         Before the first try it is the gain of an imagined success. If `divergence` is a function, its value stands in place of the gain.
 
-        With the detector "run_length", an observation can raise the gain of other state-actions that have been tried. This happens if the
-        outcomes of the observed state-action seem to have changed, for the actions with the same goal and the action from this goal back to
-        the state.
+        With the detector "run_length", an observation can also raise the gain of other actions that have been tried. If the outcomes of the
+        observed action seem to have changed, these are the actions with the same goal, and the action from this goal back to the state.
         """
         return read_only(self._reward)
 
@@ -234,9 +233,10 @@ class TransitionModel(Tabled):
 
     @property
     def outcomes(self) -> Ints:
-        """The outcome state of each bin, in order of first observation, shape (S, A, B); meaningless where the probability is 0.
+        """The outcome state of each bin, shape (S, A, B); meaningless where the probability is 0.
 
-        A bin is one distinct outcome of a state-action; B is the largest number of bins.
+        A bin is one distinct outcome of a state-action; B is the largest number of bins. Bin 0 is the state itself, bin 1 the goal of the
+        action; the others are in order of first observation.
         """
         return read_only(self._outcomes)
 
@@ -260,7 +260,8 @@ class TransitionModel(Tabled):
     def totals(self) -> Array:
         """The sum N of the counts of each state-action in the closed form of the reward (eq. 6.5), shape (S, A).
 
-        It is 0 where there is no action. The array is read only.
+        With the divergence "kl" it contains one imagined count for each state of the space. It is 0 where there is no action. The array is
+        read only.
         """
         return read_only(self._totals)
 
@@ -273,7 +274,7 @@ class TransitionModel(Tabled):
         return read_only(self._imagined)
 
     def bins(self, state: int, action: int) -> tuple[Ints, Array]:
-        """Return the outcome states of a state-action and their counts T(s, a), both (bins,), in order of first observation.
+        """Return the outcome states of a state-action and their counts T(s, a), both (bins,), in the order of `outcomes`.
 
         `bins`: number of distinct outcomes of the state-action. Imagined observations are included.
         """

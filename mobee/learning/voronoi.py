@@ -56,7 +56,7 @@ class Voronoi(Space):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The constructor's arguments and a digest of the space, as JSON values.
+        """The constructor's arguments and a hash of the space, as JSON values.
 
         `mobee.learning.record.space_from` rebuilds the space from them.
         """

@@ -24,12 +24,13 @@ Column = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Contact:
-    """An overlap of two shapes of the robot, or of a shape of the robot (`first`) and a world object (`second`).
+    """An overlap of two volumes, of which at least one is on the robot (a shape or an attached object).
 
-    `first`, `second`: names. `kind`: "solid": two solids overlap; "field": at least one of the two is a field, a volume that is not solid
-    but causes a repulsive force. Moving `first` by depth * normal separates the two. `depth`: m. `normal`: (3,) unit vector, root frame.
-    `point`: (3,) m, root frame, midway between the two deepest points. `first_link`, `second_link`: indices of the links of `first` and
-    `second`; the link of an attached object is the link that carries it; -1: a free world object.
+    `first`, `second`: their names; a free world object is always `second`. `kind`: "solid": two solids overlap; "field": at least one of
+    the two is a field, a volume that is not solid but causes a repulsive force. Moving `first` by depth * normal separates the two.
+    `depth`: m. `normal`: (3,) unit vector, root frame. `point`: (3,) m, root frame, midway between the two deepest points. `first_link`,
+    `second_link`: indices of the links of `first` and `second`; the link of an attached object is the link that carries it; -1: a free
+    world object.
     """
 
     first: str
@@ -101,12 +102,12 @@ class ContactTable:
 
     @property
     def first(self) -> Column:
-        """The first volume of each contact, (c,): the number of a shape of the robot."""
+        """The first volume of each contact, (c,): the number of a shape of the robot, or of an attached object, as in `second`."""
         return self.numbers[:, 2]
 
     @property
     def second(self) -> Column:
-        """The second volume of each contact, (c,): the number of a shape, or the number of shapes plus that of a world object."""
+        """The second volume of each contact, (c,): the number of a shape, or the number of shapes plus the index of a world object."""
         return self.numbers[:, 3]
 
     @property
@@ -160,8 +161,8 @@ def _read(rows: bytearray) -> tuple[Column, Array]:
 def touched(pose: Pose) -> dict[str, tuple[str, ...]]:
     """Return, for each part by name, the sorted names of the free world objects that touch the part in a pose.
 
-    An object touches a part if it overlaps a volume of a link that the part's motors move: a solid, or a field, which is a larger volume
-    that causes a repulsive force. Attached objects do not count. `pose`: one pose, not a batch.
+    An object touches a part if it overlaps a volume of a link that the part's motors move: a solid, a field (a larger volume that causes a
+    repulsive force), or an object that is attached to the link. `pose`: one pose, not a batch.
     """
     return {part: touched_by(pose, part) for part in pose.robot.parts}
 
@@ -169,8 +170,8 @@ def touched(pose: Pose) -> dict[str, tuple[str, ...]]:
 def touched_by(pose: Pose, part: str) -> tuple[str, ...]:
     """Return the sorted names of the free world objects that touch a part in a pose.
 
-    An object touches a part if it overlaps a volume of a link that the part's motors move: a solid, or a field, which is a larger volume
-    that causes a repulsive force. Attached objects do not count. `pose`: one pose, not a batch. `part`: name of the part.
+    An object touches a part if it overlaps a volume of a link that the part's motors move: a solid, a field (a larger volume that causes a
+    repulsive force), or an object that is attached to the link. `pose`: one pose, not a batch. `part`: name of the part.
     """
     return touched_in(pose.table, links_moved(pose.robot)[part])
 
@@ -178,8 +179,8 @@ def touched_by(pose: Pose, part: str) -> tuple[str, ...]:
 def touched_in(table: ContactTable, moved: frozenset[int]) -> tuple[str, ...]:
     """Return the sorted names of the free world objects that touch one of the links `moved` (indices).
 
-    An object touches a link if it overlaps a solid of the link, or a field, which is a larger volume that causes a repulsive force.
-    Attached objects do not count. `table`: the contacts of one pose.
+    An object touches a link if it overlaps a solid of the link, a field (a larger volume that causes a repulsive force), or an object that
+    is attached to the link. `table`: the contacts of one pose.
     """
     rows = table.numbers.tolist()
     found = {second for _, _, _, second, first_link, second_link in rows if second_link < 0 and first_link in moved}

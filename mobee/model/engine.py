@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The compiled engine of one robot: holds the objects of the core that evaluations use, for any number of threads."""
+"""The compiled engine of one robot: holds the robot and the world in the compiled core (C++), for evaluations in any number of threads."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A slow, independent engine on python-fcl, the reference for the core's contacts, and the rules for which pairs are tested.
+"""A slow, independent engine that uses python-fcl, the reference for the compiled core; and the rules for which pairs are tested.
 
 Depths are exact to 1e-6 m, fcl's tolerance. Only pairs whose bounding spheres overlap are given to fcl.
 """
@@ -232,9 +232,10 @@ def tested_pairs(robot: Robot, snapshot: Snapshot, reaching: Hands) -> tuple[Int
 
     Fields are volumes that cause repulsive forces. Volumes are numbered: first the robot's shapes, then the world's objects. Pairs of the
     robot's own shapes are those in its lists `solid_pairs` and `field_pairs`. A free object is tested against every shape except those of
-    the base; a target is not tested against the hands in `reaching`, which reach for it. An attached object is tested as a solid against
-    free objects, and against the shapes and attached objects of all links against which its own link is tested. Ghosts, objects that are
-    only drawn, are not tested. Raises UnknownName for an object that is attached to a link which the robot does not have.
+    the base; a target is not tested against the hands in `reaching`, which reach for it. An attached object counts as a solid of its link.
+    It is tested against free objects, and against the shapes and attached objects of other links, except if the pair of links is in
+    `robot.untested`. Ghosts, objects that are only drawn, are not tested. Raises UnknownName for an object that is attached to a link which
+    the robot does not have.
     """
     own = [(int(a), int(b), kind) for kind, pairs in ((SOLID, robot.solid_pairs), (FIELD, robot.field_pairs)) for a, b in pairs]
     roles = [FIELD if shape.role == "field" else SOLID for shape in robot.shapes]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Forward kinematics and Jacobians of a tree in zero-position form, for batches, in NumPy; conversion of rotations and quaternions.
+"""Forward kinematics and Jacobians of a tree from its joint axes at zero pose, for batches, in NumPy; rotations and quaternions.
 
 Quaternions are in the order w, x, y, z.
 """
@@ -19,10 +19,11 @@ class Tables:
     """The constants of a robot from which its forward kinematics is computed; n motors, J joints.
 
     At the angle or length a, the motion of a joint is the matrix (4, 4) I + sin(a) S + (1 - cos(a)) C + a D: Rodrigues' formula for a
-    rotation about a line of the root frame. S is `sine`, C is `cosine`, D is `slide` (None: every joint is revolute).
-    `coupling` (n, J), `offset` (J,): joint positions = q @ coupling + offset. `axes` (J, 3), `points` (J, 3) m: of the joints, root
-    frame, zero pose. `revolute`: (J,) 1 or 0. `ancestry`: for each link, the joints between the base and the link. `rounds`: for each
-    round of pointer jumping, the links and the ancestors whose matrices are multiplied.
+    rotation about a line of the root frame. `sine`, `cosine` and `slide`, each (J, 4, 4), are the S, C and D of the joints; `slide` None:
+    every joint is revolute. `coupling` (n, J), `offset` (J,): joint positions = q @ coupling + offset. `axes` (J, 3), `points` (J, 3) m: of
+    the joints, root frame, zero pose. `revolute`: (J,) 1 or 0. `ancestry`: for each link, the joints from the base to the link, in this
+    order. `rounds`: the order of the matrix products (pointer jumping): each round is a pair of arrays: links, and the ancestors by whose
+    matrices theirs are multiplied from the left.
     """
 
     coupling: Array  # (n, J), transposed: joint angles = q @ coupling + offset
@@ -136,8 +137,8 @@ def joint_axes(robot: Robot, transforms: Array) -> tuple[Array, Array]:
 def point_jacobian(robot: Robot, transforms: Array, link: int, point: Array) -> Array:
     """Return the Jacobian of a point that is fixed to a link (thesis eq. 5.1), (..., 6, n), with a column for each motor.
 
-    Three rows are of velocity [m/rad], then three of angular velocity, root frame. `transforms`: (..., L, 4, 4) of all links in this pose,
-    as from `link_transforms`. `link`: index of the link. `point`: (..., 3) m, root frame, in this pose.
+    The first three rows are for velocity [m/rad], the last three for angular velocity, root frame. `transforms`: (..., L, 4, 4) of all
+    links in this pose, as from `link_transforms`. `link`: index of the link. `point`: (..., 3) m, root frame, in this pose.
     """
     t = tables(robot)
     chain = t.ancestry[link]

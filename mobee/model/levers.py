@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The levers of contacts, and how the pushes of contacts depend on the levers if a robot has a least lever."""
+"""Levers: how much the depth of a contact changes when the motors move; and factors of the repulsive pushes that depend on levers."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mobee.robot.robot import LEVER, Robot
 def lever(robot: Robot, transforms: Array, links: tuple[int, int], point: Array, normal: Array) -> float:
     """Return the lever of a contact of two links [m/rad]: the norm of the derivatives of its depth with respect to the motor positions.
 
-    A joint that moves both links does not count. The unit of a motor that slides is a length that counts as 1 rad
+    A joint that moves both links does not count. For a motor that slides, the unit is the length that counts as 1 rad
     (`mobee.robot.motor_units`). `transforms`: (L, 4, 4) of all links. `links`: indices; below 0: a free object. `point` (3,) m and `normal`
     (3,) of the contact: root frame, in this pose.
     """

@@ -65,9 +65,9 @@ class Model:
     def hand(self, marker: str) -> Hand:
         """Return the hand of a marker: the links whose contacts with targets are ignored while the marker reaches; raises UnknownName.
 
-        These are the marker's link and all links that it carries. At home, the marker may also be inside fields (volumes that cause
-        repulsive forces) of earlier links of the same part. Then contacts of the fields of the earliest such link, which is nearest to the
-        base, and of all links that it carries are ignored too.
+        These are the marker's link and all links that it carries. If the marker at home is inside fields (volumes that cause repulsive
+        forces) of earlier links of the same part, take the one of these links that is nearest to the base: contacts of its fields, and of
+        the fields of all links that it carries, are ignored too.
         """
         known = self._hand_of.get(marker)
         if known is None:
@@ -116,7 +116,7 @@ class Model:
         return Pose(self.robot, self._engine, value, self.world.snapshot, NO_HANDS if reaching is None else self.hands(reaching), threads)
 
     def track(self, skin: float = 0.02) -> Track:
-        """Return an evaluator that is faster for poses of which each is near the one before, as in a motion; make one for each thread.
+        """Return an evaluator that is faster if each pose is near the previous one, as in a motion; make one for each thread.
 
         `skin`: m; the evaluator keeps a list of the pairs of volumes that are nearer than this. The engine "fcl" has no such list and
         evaluates every pair. Raises InvalidValue unless the skin is finite and above 0.
@@ -130,7 +130,7 @@ class Model:
     def jacobian(self, q: ArrayLike, marker: str) -> Array:
         """Return the Jacobian of a marker in the poses q (..., n) rad, (..., 6, n) in the root frame (thesis eq. 5.1).
 
-        Three rows are linear [m/rad], then three angular; there is a column for each motor. Raises InvalidValue, UnknownName.
+        The first three rows are linear [m/rad], the last three angular; there is a column for each motor. Raises InvalidValue, UnknownName.
         """
         value = self._checked(q)
         m = self.robot.marker(marker)

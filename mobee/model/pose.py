@@ -19,7 +19,7 @@ from mobee.robot.robot import Robot
 
 
 class Finder(Protocol):
-    """An object that computes the contacts of poses, as an engine or a list of neighbouring pairs (`mobee.model.track.Neighbours`)."""
+    """An object that computes the contacts of poses, such as an engine or a list of neighbouring pairs (`mobee.model.track.Neighbours`)."""
 
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands) -> tuple[ContactTable, Array]:
         """Return all contacts in the poses q (B, n) rad, and their projection to the motors, (B, n) m^2/rad.
@@ -143,7 +143,7 @@ class Pose:
 
         The sum is over the contacts of fields, volumes that cause repulsive forces; J is the Jacobian of the contact's point. In a contact
         of two links, the push acts on the first link, and the opposite push on the second. A push acts on all motors from its link down to
-        the base. If the robot has a least lever, each push is multiplied by a factor (`mobee.model.levers.push_factors`).
+        the base. If `robot.least_lever` is above 0, each push is multiplied by a factor (`mobee.model.levers.push_factors`).
         """
         evaluated = self._evaluated
         if evaluated is None:
@@ -171,7 +171,7 @@ class Pose:
 
     @property
     def count(self) -> int | Ints:
-        """The number of contacts of solids: an int for one pose, (...,) integers for a batch."""
+        """The number of contacts between two solids: an int for one pose, (...,) integers for a batch."""
         table = self.table
         counted = np.bincount(table.pose[table.kind == 0], minlength=len(self._flat))
         return int(counted[0]) if self.q.ndim == 1 else counted.reshape(self.q.shape[:-1])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The tables of a robot that the core reads, and the clusters of shapes that share a bounding sphere."""
+"""The tables of a robot that the compiled core reads, and the clusters of shapes that share a bounding sphere."""
 
 from __future__ import annotations
 
@@ -37,16 +37,18 @@ class Carried:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RobotTables:
-    """The tables of a robot that core/robot.cpp reads: S shapes in the order of C clusters, J joints, and the V corners of all hulls.
+    """The tables of a robot that core/robot.cpp reads: S shapes in the order of C clusters, J joints, V corners of convex shapes.
 
     `motors`: number of motors. `own_shapes`: number of shapes without carried objects. `least_lever`: m. Joints: `parent` (J,) the link
     that carries the joint; `slides` (J,) whether it is prismatic; `border` (J,) whether the link that the joint moves belongs to another
-    part than `parent`; `axis` (J, 3); `point` (J, 3) m; `motor` (K, J) the at most K motors that drive the joint; `scale` (K, J) joint
-    angle per motor angle; `offset` (J,); `travel` (K, J) motion of the joint [rad or m] when the motor moves by what counts as 1 rad in the
-    control law. Shapes: `volume` (S,) rows of VOLUME; `link` (S,); `name` (S,) index into the robot's shapes, then the carried objects;
-    `field` (S,) whether it is a field, which causes repulsive forces; `meets_world` (S,) whether it is tested against free objects;
-    `cluster` (C + 1,) first shape of each cluster; `tested` (S, S) whether two shapes are tested against each other. Corners: `corner` (V,
-    3) m, in the axes of the hull; `edge_start` (V + 1,) first edge of each corner; `edge`: the corner at the other end.
+    part than `parent`; `axis` (J, 3) and `point` (J, 3) m of the axis, root frame, zero pose; `motor` (K, J) the at most K motors that
+    drive the joint; `scale` (K, J) joint angle per motor angle, 0 in unused entries; `offset` (J,) joint angle while the motors are at 0;
+    `travel` (K, J) motion of the joint [rad or m] when the motor moves by what counts as 1 rad in the control law. Shapes: `volume` (S,)
+    rows of VOLUME; `link` (S,); `name` (S,) index into the robot's shapes, then the carried objects; `field` (S,) whether it is a field,
+    which causes repulsive forces; `meets_world` (S,) whether it is tested against free objects; `cluster` (C + 1,) first shape of each
+    cluster; `tested` (S, S) whether two shapes are tested against each other. Corners: `corner` (V, 3) m, relative to the position of the
+    shape, along its axes; `edge_start` (V + 1,) index in `edge` of the first edge of each corner; `edge`: the corner at the other end, as
+    its index among the corners of the shape.
     """
 
     motors: int
@@ -95,7 +97,8 @@ class RobotTables:
 def robot_tables(robot: Robot, carried: Sequence[Carried] = ()) -> RobotTables:
     """Return the core's tables of a robot, with the objects attached to its links as further shapes.
 
-    Raises InvalidValue if an index in the robot (parent of a joint, link of a shape or marker) is out of range. `carried`: these objects.
+    Raises InvalidValue if an index in the robot (parent of a joint, link of a shape or marker) is out of range. `carried`: the attached
+    objects.
     """
     _check(robot)
     rows, corner, edges = _rows(robot.shapes)

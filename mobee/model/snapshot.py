@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The arguments of an evaluation beside q: the world as an immutable snapshot, and the hands that reach.
+"""What an evaluation needs in addition to q: the world as an immutable snapshot, and the hands that reach.
 
-The hand of a marker is the marker's link with everything that this link carries: its contacts with targets are ignored while the
-marker reaches. The fields of the links before it in the same part belong to the hand too if the marker is inside one of them:
-otherwise they would keep the marker away from every target.
+The hand of a marker is the marker's link with all links that it carries. While the marker reaches, contacts of the hand with targets are
+ignored. If the marker is inside a field of an earlier link of the same part, contacts of the fields of that link with targets are ignored
+too: otherwise they would keep the marker away from every target.
 """
 
 from __future__ import annotations
@@ -97,8 +97,8 @@ class Hand:
     """The links of one reaching hand, whose contacts with targets are ignored.
 
     `link`: index of a link; contacts of its solids and fields, and of those of all links that it carries, are ignored. `fields`: index of a
-    link; contacts of its fields only, and of the fields of all links that it carries, are ignored. It is the same link as `link`, or an
-    earlier link of the part. A field is a volume that causes a repulsive force.
+    link; contacts of its fields only, and of the fields of all links that it carries, are ignored. `fields` is the same link as `link`, or
+    an earlier link of the part, nearer to the base. A field is a volume that causes a repulsive force.
     """
 
     link: int
@@ -111,7 +111,7 @@ NO_HANDS: Hands = ()
 
 @lru_cache(maxsize=64)
 def hand_numbers(reaching: Hands) -> tuple[int, ...]:
-    """Return the hands in the form that the core needs (`Hands` in core/scene.hpp): four link indices, two for each hand; -1: no hand.
+    """Return the hands in the form that the core needs (`Hands` in core/scene.hpp): `link` and `fields` of two hands; -1: no hand.
 
     Raises ValueError for more than two hands.
     """

@@ -55,7 +55,7 @@ class Neighbours:
 
 
 class Track:
-    """Evaluates consecutive poses of one model, of which each is near the one before: the same results as `Model.evaluate`, faster.
+    """Evaluates consecutive poses of one model: faster than `Model.evaluate` if each is near the previous one, with the same results.
 
     The argument `skin` of `Model.track` is a distance: pairs of volumes that are farther apart are not checked until a volume has moved by
     half this distance. A track takes little time to make and is for one thread at a time. For large steps between poses it is as fast as

@@ -46,15 +46,15 @@ class Volume(Protocol):
 
     @property
     def position(self) -> Array:
-        """The position of the volume (3,) m."""
+        """The position of the volume, (3,) m, in the root frame; that of a volume on a link is given for zero pose."""
 
     @property
     def rotation(self) -> Array:
-        """The rotation of the volume (3, 3)."""
+        """The rotation of the volume, (3, 3), in the root frame; that of a volume on a link is given for zero pose."""
 
 
 def bound(volume: Volume, vertices: Array | None = None) -> float:
-    """Return the radius [m] of the smallest ball about a volume's position that contains the volume.
+    """Return the radius [m] of the smallest ball centred at a volume's position that contains the volume.
 
     `vertices`: (v, 3) m, of a convex volume, relative to its position; None for the other kinds.
     """

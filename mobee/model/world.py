@@ -90,8 +90,8 @@ class World:
         """Add an object at `position` (3,) m with `rotation` (3, 3), root frame; `rotation` None: not rotated.
 
         `role`: "obstacle", "target" or "ghost". `color`: red, green, blue and optionally opacity, each 0 to 1; None: not stated. `mass`:
-        kg, of an object that the physics engine MuJoCo moves when it is pushed, with this coefficient of `friction`; None: it does not
-        move. The model and the offline plant do not use mass and friction: for them every object stays where it was put. Raises
+        kg; with a mass, the physics engine MuJoCo moves the object when it is pushed, with this coefficient of `friction`; None: it does
+        not move. The model and the offline plant do not use mass and friction: for them every object stays where it was put. Raises
         InvalidValue if the name is taken or empty, or a value is not valid.
         """
         valid_name(name)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Objects of the world: geometry, position, rotation and role, and the checks of each."""
+"""Objects of the world: geometry, position, rotation and role, and the checks of these values."""
 
 from __future__ import annotations
 
@@ -87,8 +87,8 @@ class WorldObject:
     height); box (x, y, z), full edges. `position` (3,) m, `rotation` (3, 3): in the root frame; for an attached object, in the frame of
     `link`, which is the root frame at zero pose. `role`: "obstacle", "target" or "ghost". `color`: red, green, blue and opacity, each 0 to
     1; None: not stated. `link`: name of the link that carries the object; None: it is attached to none. `mass`: kg, of an object that a
-    physics engine moves when it is pushed; None: it does not move. `friction`: coefficient of an object with a mass, with everything that
-    it touches.
+    physics engine moves when it is pushed; None: it does not move. `friction`: coefficient of friction between an object with a mass and
+    everything that it touches.
     """
 
     name: str

@@ -63,8 +63,8 @@ class Motion:
 def acceleration(state: State, terms: Sequence[Term] = TERMS) -> Array:
     """Return q" of eq. 5.7 with mass 1, (n,) rad/s^2: the sum of all terms, plus C q*' for an attractor that moves.
 
-    `terms`: the forces, each a function of the state; the functions `spring` and `damping` among them are treated separately, because the
-    last term is reduced by all other forces.
+    `terms`: the forces, each a function of the state; the functions `spring` and `damping` must not be replaced by copies, since all other
+    functions count as outside forces, which reduce the term C q*' (`following`).
     """
     total, outside = np.zeros(len(state.q)), np.zeros(len(state.q))
     for term in terms:
@@ -90,7 +90,7 @@ def step(robot: Robot, gains: Gains, motion: Motion, q: Array, wanted: Array, dt
 
     `q` (n,) rad: measured. `wanted` (n,) rad/s^2: q" of eq. 5.7. The commanded velocity stays within the motors' limits of velocity (times
     `speed_scale`) and acceleration. The position reference integrates the velocity, but waits while it is ahead of the measured position by
-    the distance of LEASH (0.3 s) at full speed. Motors of weight 0 in the gains are never moved.
+    more than the motor moves in LEASH (0.3 s) at full speed. Motors of weight 0 in the gains are never moved.
     """
     fastest = INSIDE * speed_scale * np.array([motor.max_velocity for motor in robot.motor_table])
     hardest = INSIDE * np.array([motor.max_acceleration for motor in robot.motor_table])

@@ -49,9 +49,9 @@ NOTHING = 1e-12  # m^2/s: the size of J E J^T for a marker that no motor moves
 class Reach:
     """A reach in progress: its motors, and the state of the default law from tick to tick.
 
-    `motors`: (m,) indices of the motors on which the reach exerts a force. `seen`: (6,) m, the error, averaged against the encoders' noise.
-    `remaining`: m, the norm of `seen`; `best`: m, the smallest norm so far; `since`: s since then. `escape`: (m,) rad, the last direction
-    out of a singular pose; None: the arm was in no singular pose.
+    `motors`: (m,) indices of the motors on which the reach exerts a force. `seen`: (6,) m, the error as `rows` defines it, averaged over
+    time to reduce the encoders' noise. `remaining`: m, the norm of `seen`; `best`: m, the smallest norm so far; `since`: s since then.
+    `escape`: (m,) rad, the last direction out of a singular pose; None: the arm was in no singular pose.
     """
 
     robot: Robot
@@ -74,7 +74,8 @@ class Reach:
 def begin(robot: Robot, gains: Gains, part: str | None, marker: str, target: ReachTarget) -> Reach:
     """Return the state of a new reach of `marker` for `target`.
 
-    Its motors are those of the named part, or of the whole body if `part` is None, that move the marker and have a weight above 0.
+    Its motors are those of the named part, or of the whole body if `part` is None, that move the marker and have a weight above 0 in the
+    gains (the control law never moves a motor of weight 0).
     """
     moving = (robot.coupling[0][joints_to(robot, robot.marker(marker).link)] != 0.0).any(axis=0) & (gains.weight(robot.motors) > 0)
     if part is not None:
@@ -88,7 +89,7 @@ class View:
 
     `error`: (3,) m, from the marker to its goal. `turn`: (3,) n x n*, the axis about which the normal n should turn to the wanted normal
     n*. `facing`: n . n*. `columns`: (k, 6), velocity and angular velocity of the marker for each of the k joints between base and marker.
-    `drives`: (k, m), motion of these joints for each of the m pulled motors, in the motor's unit of the control law.
+    `drives`: (k, m), motion of these joints for each of the m pulled motors (`Reach.motors`), per unit of the motor in the control law.
     """
 
     error: Array
@@ -158,10 +159,10 @@ def published(r: Reach, v: View) -> Array:
 
 
 def drawn(r: Reach, v: View, s: State, dt: float, against: Array) -> tuple[Array, Array]:
-    """Return the force of the default law on the m pulled motors, (m,), not yet saturated, and the shift of their springs, (m,) rad.
+    """Return the force of the default law on the m pulled motors, (m,), not yet saturated, and a shift of their positions, (m,) rad.
 
-    The shift moves the arm out of a singular pose; it is 0 in other poses.  `dt`: the tick [s]. `against` (n,) rad/s^2: the sum of all
-    other forces except the springs. The state of the reach is updated.
+    Springs pull the motors by the shift, which leads out of a singular pose; it is 0 in other poses.  `dt`: the tick [s]. `against` (n,)
+    rad/s^2: the sum of all other forces except the springs. The state of the reach is updated.
     """
     jacobian, error = rows(r, v)
     note_error(r, error, dt)
@@ -180,9 +181,9 @@ def drawn(r: Reach, v: View, s: State, dt: float, against: Array) -> tuple[Array
 
 
 def rows(r: Reach, v: View) -> tuple[Array, Array]:
-    """Return the Jacobian (rows, m) and the error (rows,) of the reach, in m: three rows, or six if the target has a wanted normal.
+    """Return the Jacobian (rows, m) and the error (rows,) of the reach, in m: three rows, or six if a normal is wanted.
 
-    The last three rows are those of the rotation, multiplied by ARM (0.1 m).
+    The last three rows are those of the rotation that turns the marker's normal to the wanted one, multiplied by ARM (0.1 m).
     """
     if r.target.normal is None and not r.target.faces:
         return v.jacobian[:3], v.error
@@ -205,8 +206,8 @@ def note_error(r: Reach, error: Array, dt: float) -> None:
 def motor_mobility(r: Reach, q: Array, slope: Array) -> Array:
     """Return the mobility E of the m pulled motors, (m,): the velocity of each motor per unit of force.
 
-    It is the slope of the saturation at 0 divided by the damping, and 0 for a motor in the outer half of a limit zone that the reach would
-    move farther outward. `slope` (m,): the decrease of half the squared error along each motor.
+    It is the slope of the saturation at 0 divided by the damping, and 0 for a motor in the outer half of a limit zone (where f_lim acts)
+    that the reach would move farther outward. `slope` (m,): the decrease of half the squared error along each motor.
     """
     zones = 0.5 * limit_zones(r.robot, r.gains.of_robot("limit_width", r.robot))
     low, high = r.robot.limits.T + zones.T * np.array([[1.0], [-1.0]])
@@ -218,8 +219,8 @@ def motor_mobility(r: Reach, q: Array, slope: Array) -> Array:
 def pushed(r: Reach, v: View, marker_mobility: Array, pull: Array, mobility: Array) -> Array:
     """Return the force on the marker, (rows,): (J E J^T / size + damping)^-1 pull, with enough damping for a stable motion.
 
-    `marker_mobility` (rows, rows): J E J^T / size. `pull` (rows,): the wanted motion. `mobility` (m,): E. The damping is doubled until the
-    stiffness from the curvature of the marker's path is below RATE (5 1/s).
+    `marker_mobility` (rows, rows): J E J^T / size, where size is the norm of J E J^T. `pull` (rows,): the wanted motion of the marker.
+    `mobility` (m,): E. The damping is doubled until the stiffness from the curvature of the marker's path is below RATE (5 1/s).
     """
     soft = SOFT
     while True:

@@ -36,7 +36,7 @@ class Camera:
 
     Attributes:
         axes: (3, 3), rows are the directions right, up and ahead of the camera, in the root frame.
-        corner: (2,) m, upper left corner of the picture, to the right and up in these axes.
+        corner: (2,) m, upper left corner of the picture: its coordinates along the axes right and up.
         scale: pixels per metre.
         width: columns.
         height: rows.
@@ -116,7 +116,7 @@ class Raster:
         depth: (H, W) m along the camera's axis, from the eye or, with parallel rays, from the root frame's origin; infinite where there is
             nothing.
         normal: (H, W, 3), of the surface, root frame.
-        which: (H, W), number of the solid; -1 where there is nothing.
+        which: (H, W), index of the solid in the list `solids`; -1 where there is nothing.
         group: (H, W), group of the solid; -1 where there is nothing.
         color: (H, W, 3), of the solid, 0 to 1.
     """
@@ -145,9 +145,9 @@ def places(camera: Camera, depth: Floats, which: NDArray[np.bool_]) -> Floats:
 
 
 def pixel_middles(camera: Camera) -> tuple[Floats, Floats]:
-    """Return the centres of a camera's pixels: of each column, to the right, (W,) m, and of each row, upwards, (H,) m.
+    """Return the coordinates of the pixels' centres: of the columns, (W,) m, and of the rows from top to bottom, (H,) m.
 
-    Both are measured along the camera's axes.
+    The first are measured along the camera's axis right, the second along its axis up.
     """
     right = camera.corner[0] + (np.arange(camera.width) + 0.5) / camera.scale
     up = camera.corner[1] - (np.arange(camera.height) + 0.5) / camera.scale

@@ -25,7 +25,7 @@ PALENESS = 0.72  # share of white in the colour of parts that do not matter
 class LinkSolid:
     """A coloured volume or mesh that is drawn on a link.
 
-    `link`: number of the link. `part`: name of the part that moves it. `solid`: in the root frame at the zero pose. `collides`: whether it
+    `link`: index of the link. `part`: name of the part that moves it. `solid`: in the root frame at the zero pose. `collides`: whether it
     is one of the robot's solids, which have contacts; otherwise it is only drawn.
     """
 

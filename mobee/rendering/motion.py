@@ -56,7 +56,7 @@ class Motion:
         return tuple(name for name, part in self.poses[0].robot.parts.items() if moves[part.slice].any())
 
     def moments(self, marker: str, count: int) -> Ints:
-        """Return the indices of up to `count` poses, the first and the last included, between which the marker moves equal distances.
+        """Return the indices of up to `count` poses, from the first to the last, between which the marker moves about equal distances.
 
         They are the poses to draw in a filmstrip.
         """
@@ -77,7 +77,7 @@ def motion_through(model: Model, q: ArrayLike, times: Sequence[float] | None = N
 
 
 class Recording:
-    """Records the poses of an offline plant, beginning with the present pose."""
+    """Keeps poses of an offline plant: the present one and those that `add` is called for."""
 
     def __init__(self, plant: OfflinePlant) -> None:
         self._plant = plant

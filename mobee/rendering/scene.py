@@ -30,9 +30,10 @@ LAMP = Lamp((0.37, -0.24, 0.90), ambient=0.65, diffuse=0.4, nothing=BACKGROUND) 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pixels:
-    """Some pixels of a view, with the rays that are computed for them.
+    """A selection of K pixels of a view; the ray of each pixel is computed once, also if the pixel is selected several times.
 
-    `chosen`: the rays that are computed; None: all rays of the view. `rays`: (K,), for each pixel the index of its ray.
+    `chosen`: the pixels whose rays are computed; None: all pixels of the view. `rays`: (K,), for each selected pixel the index of its ray
+    among the computed ones, row by row.
     """
 
     chosen: Chosen | None
@@ -40,19 +41,19 @@ class Pixels:
 
     @classmethod
     def some(cls, height: int, width: int, places: Ints) -> Pixels:
-        """Return some pixels of a view of height x width pixels; `places`: (K,) numbers row * width + column, which may repeat."""
+        """Select pixels of a view of height x width pixels; `places`: (K,) indices row * width + column, which may repeat."""
         mask = np.zeros(height * width, np.bool_)
         mask[places] = True
         return cls(Chosen.of(mask.reshape(height, width)), (np.cumsum(mask) - 1)[places])
 
     @classmethod
     def every(cls, height: int, width: int) -> Pixels:
-        """Return all pixels of a view of height x width pixels, row by row."""
+        """Select all pixels of a view of height x width pixels, row by row."""
         return cls(None, np.arange(height * width))
 
 
 class Scene:
-    """A copy of the robot's links and the world's objects, which draws what a camera sees."""
+    """Draws what cameras see of a robot and a world; it has its own copies of the links' poses and the objects."""
 
     def __init__(
         self,

@@ -140,9 +140,9 @@ def lowest(solids: Sequence[Solid]) -> float:
 class Packed:
     """Solids in the form that the compiled core reads.
 
-    `volumes`: (N,) table CONVEX of the volumes. `surfaces`: (M,) table SURFACE of the meshes. `numbers`: for each of these N + M volumes
-    and meshes, volumes first, its index in the list of solids that was packed. `kept`: arrays to which the tables point; they must exist as
-    long as the tables.
+    `volumes`: (N,) structured array (dtype CONVEX) of the volumes. `surfaces`: (M,) structured array (dtype SURFACE) of the meshes.
+    `numbers`: for each of these N + M volumes and meshes, volumes first, its index in the list of solids that was packed. `kept`: arrays to
+    which the tables point; they must exist as long as the tables.
     """
 
     volumes: NDArray[np.void]

@@ -25,7 +25,7 @@ _DIGITS, _DECIMALS = 16, 9
 
 @per_robot
 def robot_digest(robot: Robot) -> str:
-    """Return 16 hex digits of all properties that determine a robot's poses and contacts.
+    """Return a hash (16 hex digits) of all properties that determine a robot's poses and contacts.
 
     The names of motors and markers are included, since costs and tasks refer to them. The names of the robot, its links and its shapes are
     not included, and the motors' speeds are not included.
@@ -47,7 +47,7 @@ def robot_digest(robot: Robot) -> str:
 
 
 def world_digest(world: World, *, roles: Collection[str] = ("obstacle", "target")) -> str:
-    """Return 16 hex digits of the objects of a world that the robot can touch: their shapes, poses, roles, and links that carry them.
+    """Return a hash (16 hex digits) of the shapes, poses, roles and carrying links of a world's objects.
 
     Names, order and colours of the objects do not change the digest. Only objects whose role is in `roles` are included.
     """
@@ -147,7 +147,7 @@ def write(path: str | Path, arrays: Mapping[str, NDArray[Any]], notes: Mapping[s
 
 
 def read(path: str | Path) -> tuple[Arrays, dict[str, Any]]:
-    """Return the arrays, by name, and the notes of a file that `write` wrote.
+    """Return the arrays by name, and the notes (plain JSON values), of a file that `write` wrote.
 
     Raises MobeeError if the file does not exist, cannot be read, is damaged, or is no roadmap file.
     """

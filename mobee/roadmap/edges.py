@@ -40,18 +40,18 @@ def check_edges(
 ) -> Flags:
     """Return whether each of the edges (E, 2) between poses q (V, n) rad is free of contacts between solids, (E,).
 
-    An edge is the straight line between two poses. Every vertex is checked once. The check of an edge begins at its middle and ends at the
-    first pose with contacts. Give each edge only once: both directions have the same result. The check is fastest if the edges are sorted,
-    like those of a Roadmap.
+    An edge is the straight line between two poses (rows of q) in joint space. Every row of q that occurs in an edge is checked once; the
+    check of an edge ends at the first pose with contacts. Give each edge only once: both directions have the same result. The check is
+    fastest if the edges are sorted, like those of a Roadmap.
 
     Args:
         model: its solid shapes are checked, in the present state of its world.
         q: (V, n) rad, poses of all motors.
-        edges: (E, 2) numbers of the two poses of each edge.
-        step: largest straight distance that the marker moves between successive poses [m].
-        marker: name of the marker; None: the shape of the robot that moves farthest.
+        edges: (E, 2) indices in q of the two poses of each edge.
+        step: largest straight distance between successive checked poses [m], of the marker or of the centres of the shapes.
+        marker: name of the marker whose motion `step` limits; None: it limits the motion of the centre of every shape.
         threads: number of threads; the result does not depend on it.
-        reaching: a marker, or up to two, whose hands may touch targets: these contacts are ignored.
+        reaching: names of up to two markers; contacts of their hands with targets are ignored.
     """
     return checked(model, q, edges, step, marker, threads, reaching).free
 
@@ -64,11 +64,11 @@ def checked(
     Args:
         model: its solid shapes are checked, in the present state of its world.
         q: (V, n) rad, poses of all motors.
-        edges: (E, 2) numbers of the two poses of each edge.
-        step: largest straight distance that the marker moves between successive poses [m].
-        marker: name of the marker; None: the shape of the robot that moves farthest.
+        edges: (E, 2) indices in q of the two poses of each edge.
+        step: largest straight distance between successive checked poses [m], of the marker or of the centres of the shapes.
+        marker: name of the marker whose motion `step` limits; None: it limits the motion of the centre of every shape.
         threads: number of threads; the result does not depend on it.
-        reaching: a marker, or up to two, whose hands may touch targets: these contacts are ignored.
+        reaching: names of up to two markers; contacts of their hands with targets are ignored.
     """
     if not step > 0.0:
         raise InvalidValue(f"step {step} m: it must be above 0.")
@@ -87,9 +87,10 @@ def checked(
 
 
 def between(model: Model, q: Array, edges: Ints, step: float = STEP, marker: str | None = None) -> Ints:
-    """Return the number of poses to check between the ends of each of the edges (E, 2) between poses q (V, n) rad, (E,).
+    """Return how many intermediate poses of each edge must be checked, without its two ends, (E,).
 
-    With this number, the marker moves at most `step` [m] between successive poses; without a marker, the centre of every shape does.
+    `q`: (V, n) rad, poses. `edges`: (E, 2) indices in q of the two poses of each edge. With this number of poses, the marker moves at most
+    `step` [m] between successive poses; without a marker, the centre of every shape does.
     """
     far = np.zeros(len(edges))
     places = points(model, q, marker)
@@ -102,7 +103,8 @@ def between(model: Model, q: Array, edges: Ints, step: float = STEP, marker: str
 def points(model: Model, q: Array, marker: str | None = None) -> Array:
     """Return the positions of points of the robot in poses q (V, n) rad, (P, V, 3) m, root frame.
 
-    With a marker, P is 1 and the point is the marker. Without a marker, the points are the centres of all P shapes of the robot.
+    With a marker, P is 1 and the point is the marker. Without a marker, the points are the centres of all P shapes of the robot, in the
+    order of `robot.shapes`.
     """
     if marker is not None:
         model.robot.marker(marker)
@@ -140,9 +142,9 @@ class EdgeWatch:
     Args:
         model: its solid shapes are checked.
         q: (V, n) rad, poses of all motors.
-        edges: (E, 2) numbers of the two poses of each edge.
-        step: largest straight distance that the marker moves between successive poses [m].
-        marker: name of the marker; None: the shape of the robot that moves farthest.
+        edges: (E, 2) indices in q of the two poses of each edge.
+        step: largest straight distance between successive checked poses [m], of the marker or of the centres of the shapes.
+        marker: name of the marker whose motion `step` limits; None: it limits the motion of the centre of every shape.
         threads: number of threads; the result does not depend on it.
     """
 
@@ -161,7 +163,7 @@ class EdgeWatch:
         self.free: Flags = check_edges(model, q, edges, step, marker, threads)
 
     def update(self) -> Ints:
-        """Check again the edges that a change of the world since the last update may affect; return the numbers of these edges."""
+        """Check again the edges that a change of the world since the last update may affect; return the indices of these edges."""
         old, new = self._seen, self._model.world.snapshot
         self._seen = new
         changed = _changed(old, new)
@@ -178,8 +180,9 @@ class EdgeWatch:
     def near(self, item: WorldObject) -> Flags:
         """Return whether the robot could touch the object `item` on each edge, (E,).
 
-        The test uses distances only and is conservative: each point on the path of a shape is within half of the path's length of one of
-        the two ends. `item` must not be attached to a link.
+        The test is conservative: it may also return True for an edge on which no contact is possible. It compares the distances of the
+        object from the shapes at the two ends of the edge with half of the length of each shape's path. `item` must not be attached to a
+        link.
         """
         found = np.zeros(len(self._edges), dtype=np.bool_)
         for middles, radius, half_path in zip(self._middles, self._bounds, self._half_paths, strict=True):

@@ -80,8 +80,8 @@ class Graph:
     """An undirected graph over V vertices.
 
     `q`: (V, n) rad, the pose of each vertex. `neighbours`: for each vertex the list of vertices that an edge joins to it. `lengths`: the
-    Euclidean lengths [rad] of these edges, in the same order. `components`: (V,) number of the connected part of each vertex, 0 for the
-    largest part.
+    Euclidean lengths [rad] of these edges, in the same order. `components`: (V,) index of the connected component of each vertex, 0 for the
+    largest component.
     """
 
     q: Array
@@ -133,9 +133,9 @@ def graph(q: Array, edges: Ints) -> Graph:
 
 
 def components(count: int, edges: Ints) -> Ints:
-    """Return the number of the connected part of each of `count` vertices, (count,), for a graph with the edges (E, 2).
+    """Return the index of the connected component of each of `count` vertices, (count,), for a graph with the edges (E, 2).
 
-    Parts are numbered by size: 0 is the largest; among equal parts, the part with the lowest vertex comes first.
+    Components are sorted by size: 0 is the largest; of equally large ones, the component with the lowest vertex comes first.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -156,7 +156,7 @@ MAX_LAZY_SEARCHES = 30  # after so many searches all unchecked edges are checked
 def free_path(model: Model, roads: Graph, edges: Ints, start: Array, to_enter: Array, to_leave: Array) -> list[int]:
     """Return the vertices of a path without contacts from a posture to a goal.
 
-    The first vertex is the nearest one that a straight line without contacts joins to the start.
+    Of the vertices that a straight line without contacts joins to the start, the path begins at the nearest one from which a path exists.
 
     Args:
         model: robot and world.

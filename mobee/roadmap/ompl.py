@@ -33,7 +33,7 @@ def require_ompl() -> tuple[Any, Any, Any]:
 
 
 class ValidityChecker(Protocol):
-    """The interface of a checker that decides which poses (d,) and straight motions of d joints are valid."""
+    """The interface of a checker that decides which poses (d,) rad of d joints, and which straight motions between them, are valid."""
 
     @property
     def low(self) -> Array:
@@ -92,7 +92,7 @@ class Grown:
     """A roadmap that OMPL has grown.
 
     `q`: (V, n) rad, poses of all motors from `prm` and `prm_star`; (V, d), poses of the checker's joints from `grown`. `edges`: (E, 2)
-    numbers of the poses that an edge joins, the lower number first.
+    indices of the two poses that each edge joins, the lower index first.
     """
 
     q: Array

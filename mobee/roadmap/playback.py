@@ -192,17 +192,20 @@ class Played:
 
     @property
     def lag(self) -> float:
-        """Largest distance of a moved motor from its planned position at the same time [rad]."""
+        """Largest distance between the real and planned positions of a motor at the same time [rad], of the motors that the plan moves."""
         return float(np.abs(self._q - self._wanted).max())
 
     @property
     def missing(self) -> float:
-        """Largest distance of a moved motor from its goal at the end of the motion [rad]."""
+        """Largest distance between the last real and the last planned position of a motor [rad], of the motors that the plan moves."""
         return float(np.abs(self._q[-1] - self._wanted[-1]).max())
 
     @property
     def off(self) -> float:
-        """Largest distance of a moved motor from the nearest planned pose, over all ticks [rad]."""
+        """Largest distance of the robot from the nearest planned pose, of any time [rad], over all ticks.
+
+        The distance of two poses is that of the motor that differs most, of the motors that the plan moves.
+        """
         from scipy.spatial import KDTree
 
         return float(KDTree(self._wanted).query(self._q, p=np.inf)[0].max())
@@ -224,7 +227,9 @@ class Played:
 def play(
     model: Model, path: ArrayLike, speed: float = SPEED, rounding: float = ROUNDING, gains: Gains | None = None, seed: int = 0
 ) -> Played:
-    """Move the offline robot along a path (K, n) rad from its first pose, until it is at rest or 5 s after the end of the path.
+    """Simulate the robot on an `OfflinePlant` along a path (K, n) rad, from the first pose of the path.
+
+    The simulation ends when the robot is at rest after the planned motion, or 5 s after it.
 
     Args:
         model: the robot in its world.
@@ -272,7 +277,7 @@ def watched(model: Model, wanted: Reference, times: Array, q: Array, rested: boo
 
 
 def touched_most(model: Model, q: Array, solid: Array) -> tuple[Contact, ...]:
-    """Return the solid contacts of that pose in q (T, n) rad whose contact is deepest; an empty tuple if there are no contacts.
+    """Return all solid contacts of the pose with the deepest contact among the poses q (T, n) rad; an empty tuple without contacts.
 
     `solid`: (T,) m, depth of the deepest solid contact of each pose.
     """

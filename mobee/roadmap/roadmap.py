@@ -30,7 +30,7 @@ class Roadmap:
         model: robot and world of the roadmap.
         q: (V, n) rad, the poses of all motors.
         y: (V, m) task coordinates of the poses, in their units.
-        edges: (E, 2) numbers of the poses that an edge joins, sorted, the lower number first.
+        edges: (E, 2) indices of the two poses that each edge joins, sorted, the lower index first.
         spacing: (m,) distance between vertices in each task coordinate.
         settings: the settings of the builder as plain JSON values; "motors" are the names of the motors that may move, "names" those of the
             task coordinates, if they are known.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Masses and moments of inertia: one body for each link, conversions, plausibility."""
+"""Masses and moments of inertia: one body for each link, conversions, and a check whether an inertia is possible."""
 
 from __future__ import annotations
 

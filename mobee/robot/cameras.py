@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The cameras of a robot: cameras of its file, eyes at its markers left_eye and right_eye, and cameras that a user adds to a link."""
+"""The cameras of a robot: those of its file, or else one at each of the markers left_eye and right_eye; and those that a user adds."""
 
 from __future__ import annotations
 

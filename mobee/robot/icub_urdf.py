@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reduces the iCub's URDF of the icub-models package to the upper body that the simulator and the viewer load."""
+"""Writes the upper body of the iCub, from the URDF of the package icub-models, for the simulator and the viewer."""
 
 from __future__ import annotations
 

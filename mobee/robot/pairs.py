@@ -7,12 +7,12 @@ Solids and fields follow one rule; a pair is excluded if
 - the file excludes it: <ignore first="link" second="link"/>;
 - they are fields of the same part: an arm's own fields overlap wherever the arm bends, and its joint limits keep its solids apart.
 
-Joined links: a cluster is a group of joints, each within 5 cm of its parent joint or of a joint on the same link (shoulder, elbow and
-pro-supination, wrist, neck, torso), since a shape there fills the whole cluster. The link that carries a cluster and all links that
-its joints move are joined pairwise: chest with the whole shoulder and upper arm, upper arm with elbow and forearm, forearm with
-wrist and hand.
+Joined links: a cluster is a group of joints, each within 5 cm of its parent joint or of a joint on the same link, such as those of the
+shoulder, the elbow with pro-supination, the wrist, the neck or the torso. The shapes at a cluster overlap, since each fills the whole
+cluster. So the link that carries the cluster and all links that its joints move are joined pairwise: chest with the whole shoulder and
+upper arm, upper arm with elbow and forearm, forearm with wrist and hand.
 So hands and forearms are tested against torso, head and the other arm, and only pairs that overlap in every pose are excluded.
-With adjacency="listed" only pairs in <ignore> tags are excluded, so that `write_xml` can keep the pairs of any robot.
+If a robot file has adjacency="listed", only pairs in <ignore> tags are excluded, so that `write_xml` can keep the pairs of any robot.
 """
 
 from __future__ import annotations

@@ -1,16 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tested pairs by the rule of the program published in 2014, and by an earlier interpretation of that rule.
 
-Both rules work on the elements <link> and <joint> of a file. They find the neighbours of an element by descents of the tree, which begin
-at the element and at each of its siblings. Fields of neighbours are not tested against each other. Solids of neighbours are not tested
-against each other if both elements are of one part, or one carries the other, or both have the same parent.
+Both rules work on the elements <link> and <joint> of a file. The neighbours of an element A are the elements that a search reaches when
+it descends the tree from A and from each sibling of A; the rules differ in where the search ends. Fields of neighbours are not tested
+against each other. Solids of neighbours are not tested against each other if both elements are of one part, or one carries the other, or
+both have the same parent.
 
-adjacency="published_2014" is the rule of the program (kailfrank/MoBeE, KinTreeNode::ignoreAdjacentPairs): a descent ends when it has
-passed a link under a joint and a joint under a link, both with a solid; it continues past elements with the tag of the first element.
+adjacency="published_2014" is the rule of the program (kailfrank/MoBeE, KinTreeNode::ignoreAdjacentPairs). After a branch of the search has
+passed both a link under a joint and a joint under a link, each with a solid, it reaches only elements with the tag of A, and ends before
+the next element with the other tag.
 
-adjacency="recorded_2014" is an earlier interpretation, with which this project recorded its results on icub_2014: a descent ends when
-it has passed one link and one joint with a shape of the role in question. By this rule no field of icub_2014 touches another field at
-home; by the rule of the program the forearm's field is 3 mm deep in the field of the thumb.
+adjacency="recorded_2014" is an earlier interpretation, with which this project recorded its results on icub_2014. A branch ends when it
+has passed one link and one joint with a shape of the role in question (solid or field). By this rule no field of icub_2014 touches another
+field at home; by the rule of the program the forearm's field is 3 mm deep in the field of the thumb.
 """
 
 from __future__ import annotations
@@ -33,8 +35,8 @@ class Element:
     """A <link> or <joint> element of a robot file.
 
     `parent`: index of the element that carries it, -1: none. `tag`: "link" or "joint". `part`: name of its part. `subtree`: index of the
-    element above it with the attribute noSelfCollision, so that shapes below it are not tested against each other; -1: none. `link`: index
-    of its link in the robot.
+    element with the attribute noSelfCollision in whose subtree it is, -1: none; shapes in one such subtree are not tested against each
+    other. `link`: index of its link in the robot.
     """
 
     parent: int
@@ -105,9 +107,9 @@ def _reason(elements: Sequence[Element], i: int, j: int, role: str, near: Collec
 def neighbours(elements: Sequence[Element], bearing: Collection[int]) -> set[frozenset[int]]:
     """Return the pairs of neighbours in the tree by the rule "published_2014", as indices of elements; element 0 is the root of the file.
 
-    `bearing`: the elements that have a solid. From each element and each of its siblings a search descends the tree, and each element that
-    it reaches is a neighbour of the first one. A branch of the search ends when it has passed a link under a joint and a joint under a
-    link, both with a solid; it continues past elements with the tag of the first element.
+    `bearing`: the elements that have a solid. For each element A, a search descends the tree from A and from each sibling of A; the
+    elements that it reaches are neighbours of A. After a branch of the search has passed both a link under a joint and a joint under a
+    link, each with a solid, it reaches only elements with the tag of A, and ends before the next element with the other tag.
     """
     children: dict[int, list[int]] = {}
     for index, element in enumerate(elements):
@@ -145,9 +147,9 @@ def _passed(
 def recorded_neighbours(elements: Sequence[Element], bearing: Collection[int]) -> set[frozenset[int]]:
     """Return the pairs of neighbours in the tree by the rule "recorded_2014", as indices of elements.
 
-    `bearing`: the elements that have a shape of the role in question. From each element and each of its siblings a search descends the
-    tree, and each element that it reaches is a neighbour of the first one. A branch of the search ends when it has passed a link and a
-    joint with such a shape.
+    `bearing`: the elements that have a shape of the role in question (solid or field). For each element A, a search descends the tree from
+    A and from each sibling of A; the elements that it reaches are neighbours of A. A branch of the search ends when it has passed a link
+    and a joint with such a shape.
     """
     children: dict[int, list[int]] = {}
     for index, element in enumerate(elements):

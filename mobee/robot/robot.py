@@ -43,9 +43,11 @@ class Motor:
 
     Positions are in rad. For a motor that drives a prismatic joint with scale 1, as in a URDF, they are in m, and torques are forces in N.
     `part`: name of its part. `limits`: (2,) rad. `home`: position at home, rad. `joints`: (index, scale, offset) of each driven joint.
-    `max_velocity` (rad/s; the safety gate enforces it), `max_acceleration` (rad/s^2), `max_torque` (N m).
-    `zone_ends_at_home`: if the limit zone of the control law would include home, the zone ends at home instead, so that the robot rests
-    there. It is set for motors of a URDF or MJCF file. If it is not set, the law pushes the motor away from such a home.
+    `max_velocity` (rad/s; the gate, which checks commands, enforces it), `max_acceleration` (rad/s^2), `max_torque` (N m).
+
+    `zone_ends_at_home`: concerns a home position in a limit zone, a range near a limit in which the control law pushes inward. True: the
+    zone ends at home, so that the robot rests there. False: the law pushes the motor away from home. It is True for motors of a URDF or
+    MJCF file.
     """
 
     name: str
@@ -161,8 +163,9 @@ class Robot:
         bodies: the masses, at most one for each link, in the order of the links; () if the file has none.
         visuals: the drawn surfaces of the links, if these are not their solids.
         cameras: the cameras in the robot's file, by name; `mobee.robot.cameras.cameras_of` chooses which ones make pictures.
-        least_lever: m. 0: a contact of fields pushes the motors by J^T (thesis eq. 5.11), so a contact with a short lever hardly pushes.
-            Above 0: it pushes by LEVER^2 J^T / (|J|^2 + least_lever^2), with LEVER = 0.5 m and |J| the lever of the contact
+        least_lever: m. A contact of fields pushes the motors along J^T (thesis eq. 5.11), where J has the derivatives of its depth with
+            respect to the motor positions; the norm |J| is its lever. 0: the push is proportional to J^T, so a contact with a short lever
+            hardly pushes. Above 0: it is proportional to LEVER^2 J^T / (|J|^2 + least_lever^2), with LEVER = 0.5 m
             (`mobee.model.levers`).
     """
 

@@ -64,7 +64,7 @@ class Actions:
                 raise InvalidValue(f"target {at:.4g} rad for {motor}: must be within {low:.4g} to {high:.4g} rad")
 
     def begin(self, part: str, start: float, first_check: float) -> None:
-        """Start a part's settle test at time `start` [s]; whether the part has settled is checked first `first_check` [s] later."""
+        """Start an action of a part at time `start` [s]; whether the part has settled is checked first `first_check` [s] later."""
         row = self._row[part]
         self._start[row], self._next_check[row], self._under_way[row] = start, start + first_check, 1
 
@@ -90,11 +90,11 @@ if TYPE_CHECKING:
 
 @dataclass(slots=True, eq=False)
 class Reach:
-    """The state of one reach.
+    """The state of one reach, in which a force pulls a marker to the target.
 
-    `name`: name of the marker. `stay`: whether the part stays in the pose in which the force ended. `end`, `marker`: at the end of the
-    force, the outcome and the position of the marker (3,) m, root frame; None while the force acts. `missing`: distance of the marker from
-    the target at the end of the force [m].
+    `name`: name of the marker. `stay`: whether the part stays in the pose in which the force ended, and does not return to its attractor.
+    `end`, `marker`: at the end of the force, the outcome and the position of the marker (3,) m, root frame; None while the force acts.
+    `missing`: distance of the marker from the target at the end of the force [m].
     """
 
     name: str
@@ -105,7 +105,7 @@ class Reach:
 
 
 class ReachesUnderWay:
-    """The reaches of all parts of an offline plant to the presented target."""
+    """The reaches of all parts of an offline plant to the target that `present` has set."""
 
     def __init__(self, model: Model, controller: Controller) -> None:
         self._model, self._controller = model, controller
@@ -118,7 +118,7 @@ class ReachesUnderWay:
 
     @property
     def reaching(self) -> tuple[str, ...]:
-        """The names of the markers whose hands the targets do not repel at present."""
+        """The names of the markers on whose hands the targets exert no repulsive force at present, because they reach or are exempt."""
         drawn = [reach.name for reach in self._under_way.values() if reach.end is None]
         return tuple(dict.fromkeys(drawn if self.exempt is None else [*drawn, self.exempt]))
 
@@ -186,7 +186,7 @@ class ReachesUnderWay:
         return self._ended[part]
 
     def after(self, part: str) -> Outcome | None:
-        """Return the outcome with which the part's last reach ended; None if it was already returned or there was no reach."""
+        """Return, only once, the outcome of the last motion of the part's last reach; None later, or if no reach has ended."""
         return self._settled.pop(part, None)
 
     def drop(self, part: str) -> None:

@@ -117,8 +117,9 @@ def _run_all(waiting: dict[int, Work[T]], results: dict[int, T], lost: dict[int,
 def run_batch(work: Callable[[int], T], seeds: Iterable[int], processes: int | None = None) -> list[T]:
     """Call `work(seed)` for every seed in several processes; return the results in the order of the seeds.
 
-    `work`: a function of a module; it makes a plant with the seed, uses it, and returns an object that can be pickled. `processes`: number
-    of processes; None: one for each processor core; 1: in this process. Exceptions of `work` are raised here.
+    `work`: a function defined at the top level of a module, so that processes can import it; it makes a plant with the seed, uses it, and
+    returns an object that can be pickled. `processes`: number of processes; None: one for each processor core; 1: in this process.
+    Exceptions of `work` are raised here.
     """
     if processes is not None and (isinstance(processes, bool) or not isinstance(processes, int) or processes < 1):
         raise InvalidValue(f"processes={processes!r}: give a whole number from 1 on, or None for one per core.")

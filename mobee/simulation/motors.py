@@ -38,8 +38,8 @@ class MotorParameters:
         backlash: rad, play between motor and joint side.
         friction: rad/s, Coulomb friction, given as a velocity: at smaller commanded velocities a motor does not move; at larger ones its
             velocity is reduced by this number.
-        encoder_noise: rad, standard deviation of the white noise at a tick of 20 ms.
-        substep: s, longest time between two steps of the motors.
+        encoder_noise: rad, standard deviation of the white noise at a tick of 20 ms; at a tick of dt it is multiplied by sqrt(20 ms / dt).
+        substep: s, longest integration step of the motors; a tick is divided into equal substeps.
     """
 
     lag: PerMotor = 0.05
@@ -189,7 +189,7 @@ class Motors:
         self.begin_substeps(parameters.substep)
 
     def restart(self, seed: int, q: Array) -> None:
-        """Start again like new motors with this seed: at rest at q (n,) rad, in hold.
+        """Start again like new motors with this seed, at rest at q (n,) rad, in mode "hold", in which motors keep their position.
 
         Commands that are still delayed have no effect.
         """

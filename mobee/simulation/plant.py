@@ -193,7 +193,7 @@ class OfflinePlant:
 
     @property
     def reaching(self) -> tuple[str, ...]:
-        """The names of the markers whose hands the targets do not repel at present, because they are reaching."""
+        """The names of the markers that are reaching at present: the targets exert no repulsive force on their hands."""
         return self._reaches.reaching
 
     @property
@@ -231,8 +231,8 @@ class OfflinePlant:
     def act(self, part: str, target: Array, reaching: str | None = None) -> Outcome:
         """Set the part's attractor to `target` (n_part,) rad, run until the part has settled or timed out, and return the outcome.
 
-        `reaching`: name of a marker whose hand the targets do not repel during the action, as in a reach. Raises InvalidValue while another
-        part is acting (then use `begin` and `advance`).
+        `reaching`: name of a marker; during the action the targets exert no repulsive force on its hand, as in a reach. Raises InvalidValue
+        while another part is acting (then use `begin` and `advance`).
         """
         self._require_alone(part, "act")
         self.begin(part, target)
@@ -243,9 +243,9 @@ class OfflinePlant:
             self._reaches.exempt = None
 
     def begin(self, part: str, target: Array) -> None:
-        """Start an action: set the part's attractor to `target` (n_part,) rad and start its settle test; a reach of the part ends.
+        """Start an action: set the part's attractor to `target` (n_part,) rad; the action ends when it has settled or timed out.
 
-        Raises InvalidValue for a target beyond the motors' limits.
+        A reach of the part that is in progress is cancelled. Raises InvalidValue for a target beyond the motors' limits.
         """
         self.robot.part(part)
         self._actions.require_possible(part, target)
@@ -274,8 +274,8 @@ class OfflinePlant:
     def begin_reach(self, part: str, marker: str, stay: bool = False) -> None:
         """Start to pull the marker of a part to the presented target; `advance` then runs until the whole reach has ended.
 
-        The reach ends when the part has returned to its attractor and settled. `stay`: True: the part stays in the pose in which the force
-        ended, and the reach ends there.
+        The force ends when the part has settled or timed out. `stay`: False: the part then returns to its attractor, and the reach ends
+        when it has settled or timed out again. True: the part stays in the pose in which the force ended, and the reach ends there.
         """
         self._reaches.begin(part, marker, stay)
         self._test(part)
@@ -303,15 +303,16 @@ class OfflinePlant:
     def advance(self) -> list[tuple[str, Outcome]]:
         """Run until at least one acting part has ended; return the names and outcomes of the parts that ended, in the robot's order.
 
-        For a reach, the outcome is that of the return to the attractor; `reached` returns the outcome of the whole reach. Raises
-        InvalidValue if no part is acting.
+        For a reach, the outcome is that of the return to the attractor, or of the pull if the part stays; `reached` returns the outcome of
+        the whole reach. Raises InvalidValue if no part is acting.
         """
         return finished(self.advancing())
 
     def advancing(self) -> Work[list[tuple[str, Outcome]]]:
         """Return the computation of `advance` as a generator of its steps, for a caller that runs several plants at once.
 
-        Each step yields the address of the structure that the core must run next; the return value is that of `advance`.
+        Each step yields the memory address of the plant's structure, which the compiled core must run next; the return value is that of
+        `advance`.
         """
         acting = self._actions.under_way
         if not acting:
@@ -337,7 +338,8 @@ class OfflinePlant:
     def running(self, ticks: int) -> Work[Trace]:
         """Return the computation of `run` as a generator of its steps, for a caller that runs several plants at once.
 
-        Each step yields the address of the structure that the core must run next; the return value is that of `run`. `ticks`: their number.
+        Each step yields the memory address of the plant's structure, which the compiled core must run next; the return value is that of
+        `run`. `ticks`: number of ticks.
         """
         rows, left = [np.zeros((0, 3 * len(self.robot.motors) + 2))], ticks
         while left > 0:
@@ -351,10 +353,10 @@ class OfflinePlant:
         return self._runner.address
 
     def prepare_batch(self, deepest: Array) -> bool:
-        """Prepare the plant for a run of a batch in the core; return False if Python must take part in its ticks.
+        """Prepare the plant for a run that `PlantBatch` starts in the compiled core; return False if Python is needed in its ticks.
 
-        `deepest`: (2,) m, depths of the deepest contacts of solids and of fields; the core increases them during the ticks, and the caller
-        must keep the array alive. After each run call `conclude`.
+        `deepest`: (2,) m, depths of the deepest contacts of solids and of fields; the compiled core raises them when a contact in a tick is
+        deeper, and the caller must keep the array alive. After each run call `conclude`.
         """
         if self._digest is not None or self._callback is not None or self._reaches.exempt or self._runner.needs_python:
             return False
@@ -373,10 +375,10 @@ class OfflinePlant:
         return rows
 
     def conclude(self) -> Array:
-        """Update the plant after the core has run ticks; return their record (ticks, 3 n + 2), empty if none was made.
+        """Update the plant after the compiled core has run ticks; return one row per recorded tick, (ticks, 3 n + 2).
 
-        A row has the encoders, joint positions and velocities (n each), and the depths [m] of the deepest contacts of solids and of fields.
-        Raises ActionInterrupted if the motors' state is no longer finite.
+        A row has the encoders, joint positions and velocities (n each), and the depths [m] of the deepest contacts of solids and of fields;
+        there are no rows if the ticks were not recorded. Raises ActionInterrupted if the motors' state is no longer finite.
         """
         rows, done, lost = self._runner.results()
         if done:

@@ -40,14 +40,14 @@ def stiffened(robot: Robot, alive: NDArray[np.bool_], keep_parts: bool = False, 
 
     Links whose joints no active motor drives are merged into their parents. Contacts that no active motor can change are left out. The
     forces on active motors stay equal up to rounding, and exactly equal if all motors are active. Markers, masses and attached objects are
-    left out. The result is cached while it is in use, so that plants share the core's data of it.
+    left out. The result is cached while it is in use, so that plants share it.
 
     Args:
         robot: the robot.
         alive: (n,) whether each motor is active.
-        keep_parts: whether links of different parts are not merged, so that forces can be cut between parts.
+        keep_parts: whether links of different parts are not merged, so that a contact force can act on the motors of one part only.
         solids: whether solids are kept; False: only fields, the volumes that cause repulsive forces, are kept.
-        apart: numbers of further links that are not merged.
+        apart: indices of further links that are not merged.
     """
     known, key = _known(robot), (alive.tobytes(), keep_parts, solids, tuple(apart))
     found = known.get(key)

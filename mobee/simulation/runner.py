@@ -32,7 +32,7 @@ Work = Generator[int, None, T]
 
 
 def finished(work: Work[T]) -> T:
-    """Run all steps of the work of one plant in the core, and return its result."""
+    """Run a computation of one plant, such as `OfflinePlant.advancing` returns, to its end in the compiled core; return its result."""
     run = core.calls().run
     try:
         while True:
@@ -64,7 +64,10 @@ class Trace:
 
     @classmethod
     def of(cls, record: Array) -> Trace:
-        """Make a trace from the record of the core, (ticks, 3 n + 2), whose columns are the attributes of a trace in their order."""
+        """Make a trace from the array (ticks, 3 n + 2) that the compiled core has written, a row per tick.
+
+        Columns: n encoders, n joint positions, n velocities, and the depths of the deepest contacts of solids and of fields.
+        """
         n = (record.shape[1] - 2) // 3
         return cls(record[:, :n], record[:, n : 2 * n], record[:, 2 * n : 3 * n], record[:, 3 * n], record[:, 3 * n + 1])
 
@@ -73,7 +76,7 @@ class Trace:
 
 
 class Runner:
-    """Runs the ticks of one plant; it holds the delayed commands, and the encoders and forces of the last tick."""
+    """Runs the ticks of one plant in the compiled core; holds the commands not yet in effect, and encoders and forces of the last tick."""
 
     def __init__(self, controller: Controller, motors: Motors, alive: NDArray[np.bool_], dt: float, command_age: int, parts: Table) -> None:
         """Prepare the structure that the core runs.
@@ -131,8 +134,8 @@ class Runner:
     def prepare(self, most: int, kept: bool, solids: bool, reaching: tuple[str, ...] = ()) -> int:
         """Prepare the next run of up to `most` ticks; return the address of the structure that the core must run.
 
-        `kept`: whether the ticks are recorded. `solids`: whether contacts of solids are computed too, for the record. `reaching`: names of
-        the markers whose hands the targets do not repel.
+        `kept`: whether encoders, joints and contacts of every tick are recorded, see `results`. `solids`: whether contacts of solids are
+        computed too, for this record. `reaching`: names of the markers that reach: targets do not repel their hands.
         """
         controller, motors, struct = self._controller, self._motors, self._struct
         if self.batch_world is not None:
@@ -166,10 +169,10 @@ class Runner:
         return bool(controller.forced or controller.pushed or controller.reaches or controller.terms or controller.modality == "torque")
 
     def prepare_batch(self, deepest: Array) -> None:
-        """Prepare successive runs of a batch in the present world, without Python between the ticks.
+        """Prepare several runs, one after the other, that `PlantBatch` starts in the present world, without Python between the ticks.
 
-        `deepest`: (2,) m, depths of the deepest contacts of solids and of fields; the core increases them during the ticks, and the caller
-        must keep the array alive.
+        `deepest`: (2,) m, depths of the deepest contacts of solids and of fields; the compiled core raises them when a contact in a tick is
+        deeper, and the caller must keep the array alive.
         """
         world = self._controller.model.world.snapshot
         if self.batch_world is not world:
@@ -179,7 +182,7 @@ class Runner:
     def results(self) -> tuple[Array, int, bool]:
         """Return the record (ticks, 3 n + 2) of the last run, the number of ticks run, and whether the motors' state is no longer finite.
 
-        The record is empty if the ticks were not recorded.
+        A row of the record has the columns that `Trace.of` takes; there are no rows if the ticks were not recorded.
         """
         done, end = self._struct.ticks_run, self._struct.end
         if done:

@@ -18,7 +18,7 @@ WINDOW = 0.035  # s: readings within this time of the stamp are used
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Moment:
-    """The encoders at one time, by a straight line through the readings around it.
+    """The encoder values at one time, from a straight line fitted to the readings around this time.
 
     `q`: (n,) rad. `dq`: (n,) rad/s. `variance`: (n,) rad^2, of q.
     """

@@ -62,7 +62,7 @@ class Sensor:
         return View(rotation.T * UPWARDS, np.array([left, -top]), self._scale, self._width, self._height, position)
 
     def pixels(self, sample: int) -> Pixels:
-        """Return the pixels of the view of sample number `sample` that belong to the height * width pixels of the picture, row by row."""
+        """Return the pixels of the view of sample number `sample` that give the height * width pixels of the picture, row by row."""
         return self._pixels[sample]
 
     def develop(self, light: Floats, rng: np.random.Generator) -> Picture:
@@ -104,8 +104,8 @@ class Cameras:
     def expose(self, name: str, postures: Sequence[Array]) -> Picture:
         """Return the picture of a camera (height, width, 3), bytes red, green, blue; `name`: name of the camera.
 
-        `postures`: positions of all motors (n,) rad in the simulation, at each of the `moments`. The method adds the offsets
-        `errors.encoders` to them, so that the encoders of the head are wrong by these offsets.
+        `postures`: positions of all motors (n,) rad in the simulation, at each of the `moments`. The robot is drawn at these positions plus
+        the offsets `errors.encoders`; so its head is not where the simulated encoders say.
         """
         camera, scene = self._scene.cameras[name], self._scene
         light = np.zeros((self.settings.height * self.settings.width, 3), np.float32)
@@ -116,9 +116,10 @@ class Cameras:
         return self._sensor.develop(light, self._rng)
 
     def shares(self, name: str, postures: Sequence[Array], objects: int) -> Floats:
-        """Return the share of each pixel that shows each of the first `objects` objects of the world, (height, width, objects), 0 to 1.
+        """Return by how much each pixel shows each of the world's first `objects` objects, (height, width, objects), shares 0 to 1.
 
         `name` and `postures` are those of `expose`: the camera, and the positions of all motors (n,) rad at each of the `moments`.
+        `objects`: number of objects.
         """
         camera, scene = self._scene.cameras[name], self._scene
         found = np.zeros((self.settings.height * self.settings.width, objects), np.float32)

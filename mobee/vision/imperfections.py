@@ -21,7 +21,7 @@ _STREAM = 0x65796573  # of random numbers, beside those of motors and encoders o
 
 @dataclass(frozen=True, kw_only=True)
 class CameraSettings(Settings):
-    """Settings of imperfect cameras, which are all alike; the defaults are those of an iCub's Dragonfly cameras, as far as known.
+    """Settings of imperfect cameras, equal for all cameras; the defaults are those of an iCub's Dragonfly cameras, as far as known.
 
     The lens is a published one (DRAGONFLY).  Exposure, noise, latency and jitter are assumed: typical values of such CCD cameras on
     FireWire.  The tolerances (`mount_*`, `encoder_offset`, `tag_*`) bound the errors of the kinematic model; `camera_errors` draws the

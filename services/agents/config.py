@@ -114,8 +114,8 @@ class Config(LearningConfig, frozen=True, kw_only=True):
     def check_robot(self, robot: Robot) -> None:
         """Check the settings for the robot.
 
-        Raises MobeeError if a name is unknown, if the part spans no state space, or if the part does not move the marker that is to reach
-        for the targets.
+        Raises MobeeError if a name is unknown, if no state space of the part can be made from the settings, or if the part does not move
+        the marker that is to reach for the targets.
         """
         super().check_robot(robot)
         for kind, table in NAMED.items():
@@ -141,8 +141,8 @@ class Config(LearningConfig, frozen=True, kw_only=True):
     def space(self, robot: Robot) -> Space:
         """Make the state space; raises MobeeError if the settings are not valid.
 
-        By default it is the lattice of thesis 7.4 for the part. With an `object`, each state is a posture of the lattice and a cell of the
-        object's area.
+        By default the states are the postures of the lattice of thesis 7.4 for the part. With an `object`, each state is a pair of such a
+        posture and a cell of the object's area.
         """
         postures = self._postures(robot)
         if not self.object:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The live plant of an agent whose states hold where an object is: an action ends when the object is seen at rest in its area."""
+"""The live plant of an agent whose states contain the place of an object: an action ends when the object is seen at rest in its area."""
 
 from __future__ import annotations
 

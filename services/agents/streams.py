@@ -72,9 +72,10 @@ def publish_decision(stream: Publisher[Decision], agent: CuriousAgent, state: in
 
 
 def planned_states(agent: CuriousAgent, state: int) -> list[int]:
-    """Return the states that an agent expects to pass by its plan, from `state` to the one in which it expects the largest reward.
+    """Return the sequence of states that an agent expects if it follows its plan from `state`.
 
-    The first element is `state`; there are at most LONGEST_PLAN (12) elements.
+    The first element is `state`. The last one is the state in which the agent expects the largest reward, among the first LONGEST_PLAN (12)
+    states of the plan.
     """
     action_values, reward = agent.plan()[1], agent.model.reward
     passed, rewards = [state], []
@@ -126,7 +127,7 @@ class LearnedStream:
 
 
 def surprises(model: TransitionModel) -> list[Surprise]:
-    """Return the observed outcomes that differ from the goals of their actions, each with its share of the tries of the action.
+    """Return the observed next states that differ from the goals of their actions, each with its share of the action's observations.
 
     Imagined outcomes, which are pseudo-counts from before the first try, do not count. At most MAX_SURPRISES (2000) outcomes are returned,
     those with the largest shares.
@@ -141,7 +142,7 @@ def surprises(model: TransitionModel) -> list[Surprise]:
 
 
 class ReachStream:
-    """Publishes the transitions of an agent that learns to reach, and `Learned` messages with their counts and with rewards and values.
+    """Publishes the transitions of an agent that learns to reach, and `Learned` messages (counts of transitions, rewards and values).
 
     The reaches are not published here: the controller publishes a `Reach` message for each.
     """

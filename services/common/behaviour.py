@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A behaviour as a process: moves the attractor of a part by what it sees, pauses when it cannot, and reports why (docs/behaviours.md)."""
+"""A behaviour as a process: moves a part by the position of a target, pauses while it cannot, and reports why (docs/behaviours.md)."""
 
 from __future__ import annotations
 
@@ -44,7 +44,10 @@ class BehaviourConfig(ServiceConfig, frozen=True, kw_only=True):
     """Time without a target after which the part is released, in s of simulated time."""
 
     def margin(self, robot: Robot) -> Array:
-        """Return the width of the zone before the limits of each motor, (n,) rad, in which the control law pushes the motor inward."""
+        """Return the width of each motor's limit zone, (n,) rad: within it, the control law pushes the motor away from the limit.
+
+        If the zones at a motor's two limits differ, the width is that of the wider one.
+        """
         zones: Array = limit_zones(robot, Gains.named(self.gains).of_robot("limit_width", robot)).max(axis=1)
         return zones
 
@@ -105,7 +108,7 @@ class Behaviour:
     def numbers(self) -> Mapping[str, float]:
         """Return the numbers of the current measurement, by name, for the call `stat`.
 
-        "steps": number of steps since the last `mark`. "follows": whether the part follows the target now. "step_ms_p50", "step_ms_p99":
+        "steps": number of steps since the last `mark`. "follows": True while the part follows the target. "step_ms_p50", "step_ms_p99":
         percentiles of the computing time of a step [ms]; -1: there was no step.
         """
         times = {f"step_ms_p{p}": self._times.at(p) if self._steps else NOT_MEASURED for p in (50, 99)}

@@ -117,10 +117,10 @@ class Latest(Generic[_M]):
 
 
 def part_of(cls: type[Message], name: str) -> str | None:
-    """Return the name of the part to which messages of the type `cls` belong, if their key contains a part; otherwise None.
+    """Return the part by whose number of motors the lengths of vectors in messages of the type `cls` are checked; None: not checked.
 
-    The vectors of such a message must have one number for each motor of that part. `name`: the variable in the key. The result is None, so
-    that lengths are not checked, also if `name` is * (any part).
+    `name`: value of the variable in the messages' key. If the variable is the part, the result is `name`, except for * (any part). In all
+    other cases the result is None.
     """
     return name if cls.stream.variable == "part" and name != "*" else None
 
@@ -128,9 +128,9 @@ def part_of(cls: type[Message], name: str) -> str | None:
 def other_key(received: zenoh.Sample | zenoh.Query) -> str:
     """Return the key under which a message or call was sent, if it has arrived under another key; otherwise an empty text.
 
-    `received`: the message or call, as Zenoh has delivered it. Each sender attaches the key, because Zenoh transmits numbers in place of
-    keys: just after a connection has ended and a new one has begun, a number can stand for another key. If the attached key is empty, the
-    result is "nothing"; if none is attached, it is empty.
+    `received`: the message or call, as Zenoh has delivered it. Zenoh transmits numbers in place of keys, and just after a connection was
+    replaced by a new one, a number can stand for another key. Each sender therefore attaches the key to the message. If no key is attached,
+    the result is an empty text; if the attached key is empty, the result is "nothing".
     """
     attached = received.attachment
     if attached is None or (sent := attached.to_bytes()) == str(received.key_expr).encode():
@@ -182,7 +182,7 @@ class Bus:
         Args:
             cls: type of the messages; its `stream` contains key and delivery class.
             name: the variable in its key, such as the part.
-            delivery: another delivery class than the message's own.
+            delivery: delivery class of the stream; None: that of the type `cls`.
         """
         return Publisher(self, cls.stream.key(name), cls, delivery or cls.stream.delivery)
 

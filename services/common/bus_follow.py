@@ -29,7 +29,7 @@ REST_TIMEOUT = 60.0  # s until the parts rest after the motion; the controller e
 
 
 class BusFollower(BusPlant):
-    """A BusPlant that moves several parts together along a path of attractors. Every wait has a time limit."""
+    """A BusPlant that moves several parts together along a path of attractors (postures to which they move). All waits have time limits."""
 
     def __init__(self, service: Service, robot: Robot) -> None:
         super().__init__(service, robot, tuple(robot.parts))

@@ -34,9 +34,9 @@ SEND_AGAIN_WITHIN = 10.0  # s of the bus clock from the end of the controller, a
 class Sent:
     """An action that a controller has accepted.
 
-    `controllers`: instances of the controller that were alive when the action was sent. `k`: tick at which the action began. If it was
-    sent again to a later controller, `k` is that of the later controller, `first_k` that of the first, and `touched` are the world objects
-    that the part has touched before.
+    `id`: id of the action. `controllers`: ids of the controller processes that were running when the action was sent. `k`, `first_k`: tick
+    at which the action began. If the controller has ended and the action was sent again to a new one, `k` is the tick of the new start and
+    `first_k` that of the first start; `touched`: names of the world objects that the part had touched before the new start.
     """
 
     id: str
@@ -50,8 +50,11 @@ class BusPlant:
     """The live robot as a plant (`mobee.reach.ReachPlant`): acts and reaches with some parts through controller and model on the bus.
 
     To move a part, it takes the part's goal, which is the right to set the part's attractor, the posture to which the controller moves the
-    part. While it waits, the service answers calls. In lockstep it also answers ticks for its service: a tick that waits for a decision of
-    this service is answered when the service waits again, so that the decision is made within that tick however long it takes.
+    part. While it waits, the service answers calls.
+
+    In lockstep (every tick waits for all participants) the plant also answers the ticks for its service. It answers a tick only when the
+    service waits again, that is, after the service has decided on its next action. So simulated time stands still during a decision, unless
+    it takes longer than the patience of robot_sim.
     """
 
     def __init__(self, service: Service, robot: Robot, parts: tuple[str, ...]) -> None:
@@ -126,12 +129,12 @@ class BusPlant:
         self._reaches.present(target)
 
     def present_object(self, name: str, aim: Aim = "centre", normal: Array | None = None, faces: bool = False) -> ReachTarget:
-        """Use the object `name` of the model's world as target, also while it moves; return the target at its present position.
+        """Use the object `name` of the model's world as the target of reaches; return the target at its present position.
 
-        `aim`: the marker has to reach the "centre" or the "surface" of the target. `normal`: desired direction (3,) of the marker's normal,
-        root frame; None: any. `faces`: True: the normal has to point at the target. Raises UnknownName if there is no such object;
-        InvalidValue if it is stale, that is, not seen any more, or if its role is not target; ActionInterrupted if the model does not
-        answer.
+        If the object moves, reaches follow it. `aim`: the marker has to reach the "centre" or the "surface" of the target. `normal`:
+        desired direction (3,) of the marker's normal, root frame; None: any. `faces`: True: the normal has to point at the target. Raises
+        UnknownName if there is no such object; InvalidValue if it is stale, that is, not seen any more, or if its role is not target;
+        ActionInterrupted if the model does not answer.
         """
         return self._reaches.present_object(name, aim, normal, faces)
 
@@ -265,10 +268,7 @@ class BusPlant:
             raise ActionInterrupted("robot_sim started a new run")
 
     def leave(self) -> None:
-        """Release all goals, remove the target and, in lockstep, end the participation of this service.
-
-        In lockstep every tick waits for all participants.
-        """
+        """Release all goals and remove the target; in lockstep, also report that later ticks need not wait for this service."""
         for part in list(self._epochs):
             self.release(part)
         self._reaches.leave()

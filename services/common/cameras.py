@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The cameras of a scenario: the same for the renderer, the locator and the monitor."""
+"""The cameras of a scenario: renderer, locator (services/vision) and monitor make the same cameras from the same settings."""
 
 from __future__ import annotations
 

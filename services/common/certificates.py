@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A folder of keys: a small certificate authority, and an identity (private key and certificate) for each service and kind of client.
 
-The certificate of an identity holds its name (CN) and its party (OU) in the table of who may do what (bus_schema/authority.py).
+The certificate of an identity holds its name (CN) and its party (OU), the role that decides what it may do (bus_schema/authority.py).
 """
 
 from __future__ import annotations

@@ -39,7 +39,9 @@ class Stop(Struct, frozen=True):
 
 
 def replaces(new: Stop, old: Stop | None) -> bool:
-    """Return whether a new stop replaces the old one in the record: if there is no old one, or only the old one is by the launcher.
+    """Return whether the stop `new` replaces the stop `old` in the record.
+
+    This is so if `old` is None, or if the launcher has set `old` and another process sets `new`.
 
     A stop by the launcher ends with the run of the system that it has launched; a stop by another process stays.
     """
@@ -60,7 +62,8 @@ class StopRecord:
     def of_endpoint(cls, endpoint: str, states: Path | None = None) -> StopRecord:
         """Return the record of the robot that is reached at an endpoint of this machine; all runs of the robot share it.
 
-        `states`: the folder of states of the user who has launched the robot; None: that of the user of this process.
+        `states`: folder in which programs keep the state files of the user who has launched the robot, such as ~/.local/state; None: that
+        of the user of this process.
         """
         endpoint = re.sub("^(tls|quic)/", "tcp/", endpoint)  # a stop stays in force with or without security
         states = states or Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local/state")
@@ -83,7 +86,7 @@ class StopRecord:
             self._path.unlink(missing_ok=True)
 
     def read(self) -> Stop | None:
-        """Return the stop in force; None if the robot is released. A file that cannot be read gives a stop."""
+        """Return the stop in force; None if the robot is released. If the file cannot be read, return a stop with this reason."""
         try:
             found = json.loads(self._path.read_bytes())
             if found["stopped"] is False:

@@ -25,10 +25,10 @@ it may join."""
 
 
 def wait_until_released() -> tuple[str, ...]:
-    """Wait until the services on which this one depends are ready, if a launcher has started it.
+    """If a launcher has started this service, wait until the services on which it depends are ready.
 
-    Returns the words of the environment variable MOBEE_HELD: the instance of the router and, if the launcher has joined from another host,
-    the launcher's process id; () without a launcher. Raises SystemExit if the launcher ends before.
+    Returns the words of the environment variable MOBEE_HELD: the id of the router's process on the bus and, if the launcher has joined from
+    another host, the launcher's process id; () without a launcher. Raises SystemExit if the launcher ends during the wait.
     """
     held = os.environ.pop(HELD, "").split()
     if held and not os.read(sys.stdin.fileno(), 1):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A part that a behaviour moves by an attractor of its own: takes the goal when it may, never waits for an answer."""
+"""The part that a behaviour moves: takes the part's goal when it may, and moves the part's attractor; never waits for an answer."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ class FollowedPart:
         self._stream.put(epoch=self._epoch, q=np.clip(q, self._low, self._high).tolist(), dq=velocity.tolist())
 
     def forget(self) -> None:
-        """Drop the motions that the controller has reported; call this at the start of a run."""
+        """Drop the stored `Motion` messages of the controller; call this at the start of a run."""
         self._motions.clear()
 
     def _note_motion(self, part: str, motion: Motion) -> None:

@@ -43,7 +43,8 @@ def hand_of(robot: Robot, part: str) -> str:
 def end_markers(robot: Robot) -> tuple[str, ...]:
     """Return the names of the markers on links without child links, or of all markers that motors move if no such link has a marker.
 
-    Only markers that a motor moves count. Markers that more motors move come first, so that a hand comes before a wheel.
+    Only markers that a motor moves count. They are sorted by the number of motors that move them, the largest number first: a hand comes
+    before a wheel.
     """
     inner = {joint.parent for joint in robot.joints}
     links = frozenset[int]().union(*links_moved(robot).values())

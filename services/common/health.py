@@ -69,9 +69,9 @@ class Health:
     def numbers(self, waiting: int) -> dict[str, int | float | None]:
         """Return the present numbers, by name; None: not measured.
 
-        "rate", "age_ms", "gap_ms": rate [Hz], time since the last, and longest gap of the ticks. "refused_rate": refused messages per
-        second. "memory_mb", "files", "threads": memory, open files and threads of the process. "waiting": number of messages and calls in
-        the inbox, as given by `waiting`.
+        "rate", "gap_ms": rate of the ticks [Hz], and longest time between two ticks, between the last two calls of `check`. "age_ms": time
+        since the last tick. "refused_rate": refused messages per second. "memory_mb", "files", "threads": memory, open files and threads of
+        the process. "waiting": number of messages and calls in the inbox, as given by `waiting`.
         """
         age, gap = self.beats.age(time.monotonic()), self.beats.gap
         return {

@@ -78,7 +78,7 @@ class Inbox:
         self._wake()
 
     def handle(self, handler: Handler) -> None:
-        """Run the handler in this thread if the main thread waits in `serve` and no handler is queued; otherwise queue the handler.
+        """Run the handler in the calling thread if the main thread waits in `serve` and no handler is queued; otherwise queue the handler.
 
         An exception of the handler is raised in the main thread.
         """
@@ -112,7 +112,7 @@ class Inbox:
         return True
 
     def offer_later(self, handler: Handler, crowd: int = CROWDED) -> bool:
-        """Queue a handler without waking the main thread; it runs just before the next handler that `put` queues.
+        """Queue a handler without waking the main thread; it runs just before the next handler that is not queued by this method.
 
         Return True. If `crowd` handlers already wait, drop the handler, count it in `dropped` and return False.
         """

@@ -69,7 +69,8 @@ class Listener:
             cls: type of the messages.
             handler: called in the main thread.
             name: the variable in the message's key, such as the part; by default any.
-            history: also handle messages from before this service joined, as soon as the run is known.
+            history: also handle messages that were published before this service subscribed, as soon as it knows the present run of
+                robot_sim.
             any_run: also handle messages of another run of robot_sim.
             crowd: number of waiting handlers at which further messages of this stream are dropped.
             later: do not wake the main thread; the messages are handled just before the next message of another stream.
@@ -114,7 +115,7 @@ class Listener:
     def on_clock(self, handler: Callable[[Clock], None]) -> None:
         """Call `handler` with the newest `Clock` message.
 
-        At the first message of a run of robot_sim, the handlers of `on_run` are called before it.
+        At the first message of a run of robot_sim, the handlers of `on_run` are called before `handler`.
         """
         self._on_time(Clock, handler)
 
@@ -123,9 +124,9 @@ class Listener:
         self._on_time(Tick, handler)
 
     def on_turn(self, handler: Callable[[Turn], None]) -> None:
-        """Call `handler` with the `Turn` messages for this service: only the ticks that wait for its answer.
+        """Call `handler` with each `Turn` message for this service, which says that the present tick waits for the service's answer.
 
-        For lockstep, instead of `on_clock`.
+        Use this in lockstep instead of `on_clock` if the service needs only these ticks.
         """
         self._on_time(Turn, handler, self.bus.who)
 
@@ -172,10 +173,10 @@ class Listener:
 
 
 def stay_known(offer: Callable[[zenoh.Sample], None]) -> Callable[[zenoh.Sample], None]:
-    """Return a callback that calls `offer`, and for which Python keeps its thread state in the calling thread of Zenoh.
+    """Return a callback that calls `offer`, and that threads of Zenoh can call at less cost.
 
-    Otherwise Python allocates such a state each time a thread of Zenoh calls, and frees it when the call ends, which costs more than the
-    callback itself. The returned callback claims the state once and never releases it.
+    Python normally allocates a thread state for each call from a thread of Zenoh, and frees it when the call ends, which costs more than
+    the callback itself. The returned callback claims the state at its first call in a thread, and never releases it.
     """
 
     def call(sample: zenoh.Sample) -> None:

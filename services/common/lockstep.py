@@ -19,7 +19,7 @@ TEST_DELAY = "MOBEE_TEST_DELAY_MS"  # environment variable: longest random sleep
 
 
 class Participant:
-    """A service's part in lockstep: sends robot_sim the message that the service has answered a tick. In free mode it does nothing."""
+    """Sends robot_sim a service's answers to ticks in lockstep (every tick waits for all participants). In free mode it does nothing."""
 
     def __init__(self, service: Service) -> None:
         self._locked = service.keeps_step = service.locked
@@ -33,9 +33,10 @@ class Participant:
     ) -> None:
         """Publish that this service has sent all its messages for tick k (`StepDone`). In free mode this does nothing.
 
-        `ok`: False if an input was missing, so that the run is not repeatable. `busy`: set by the controller only, names of services that
-        have nothing to decide. `last`: True if the service leaves lockstep. `including`: participants whose answers to this tick were used,
-        so that they need not answer. `implied`: publish nothing, because the answer of another service will include this one.
+        `ok`: False if an input was missing, so that the run is not repeatable. `busy`: names of services that have nothing to decide in
+        this tick; only the controller sets it. `last`: True if the service leaves lockstep. `including`: names of participants that need
+        not answer this tick, because this service has used their messages for it. `implied`: True: publish nothing, because the answer of
+        another service will include this one.
         """
         if not self._locked:
             return
@@ -53,9 +54,9 @@ class Barrier:
     """The participants that must answer a tick in lockstep, and their answers.
 
     A tick waits only for participants that are present. A participant is present from its first answer on. It is absent when its liveliness
-    token has disappeared, when it was dropped because it was late, or when it has given its last answer; after another answer it is present
-    again. The controller's answer to a tick lists participants that are busy with an action: these need not answer this tick. All others
-    get a `Turn` message after the controller's answer, so that an agent need not read every tick.
+    token has disappeared, when it was dropped because it was late, or when it has left lockstep; if it answers again, it is present again.
+    The controller's answer to a tick lists participants that are busy with an action: these need not answer this tick. All others get a
+    `Turn` message after the controller's answer, so that an agent need not read every tick.
     """
 
     def __init__(
@@ -124,7 +125,7 @@ class Barrier:
                 turn.put(dt=self._service.bus.dt)
 
     def note(self, who: str, re_k: int, answer: Answer) -> None:
-        """Record the answer of the participant `who` to tick re_k, and those of the participants that the answer includes."""
+        """Record that the participant `who`, and the participants in `answer.including`, have answered tick `re_k`."""
         for one in (who, *answer.including):
             self._answered[one] = re_k
             self._present.add(one)

@@ -70,7 +70,7 @@ def alive(session: zenoh.Session) -> dict[str, list[str]]:
 
 
 def stats(session: zenoh.Session, names: list[str], timeout: float = 1.0) -> dict[str, Stat]:
-    """Return a dict from each of the services `names` to its status, all requested at once.
+    """Return a dict from each of the services `names` to its status; all are asked at the same time.
 
     Services that do not answer within `timeout` [s] are left out.
     """

@@ -50,12 +50,12 @@ class ReachClient:
         self._target, self._object, self._is_there = target, TARGET, target is not None
 
     def present_object(self, name: str, aim: Aim = "centre", normal: Array | None = None, faces: bool = False) -> ReachTarget:
-        """Use the object `name` of the model's world as target, also while it moves; return the target at its present position.
+        """Use the object `name` of the model's world as the target of reaches; return the target at its present position.
 
-        `aim`: the marker has to reach the "centre" or the "surface" of the target. `normal`: desired direction (3,) of the marker's normal,
-        root frame; None: any. `faces`: True: the normal has to point at the target. Raises UnknownName if there is no such object;
-        InvalidValue if the object is stale, that is, not seen any more, or if its role is not target, because it then repels hands;
-        ActionInterrupted if the model does not answer.
+        If the object moves, reaches follow it. `aim`: the marker has to reach the "centre" or the "surface" of the target. `normal`:
+        desired direction (3,) of the marker's normal, root frame; None: any. `faces`: True: the normal has to point at the target. Raises
+        UnknownName if there is no such object; InvalidValue if the object is stale, that is, not seen any more, or if its role is not
+        target, because it then repels hands; ActionInterrupted if the model does not answer.
         """
         found = self._known(name)
         if found.role != "target":

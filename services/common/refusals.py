@@ -107,7 +107,7 @@ class RefusalLog:
         return log
 
     def take(self) -> Counter[Refusal]:
-        """Return what was refused since the last call, with the number of times of each."""
+        """Return the refusals since the last call, each with its number of occurrences."""
         with self._lock:
             found, self._found = self._found, Counter()
         return found

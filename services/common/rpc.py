@@ -58,7 +58,7 @@ def call(
         request: type of the request.
         reply: type of the reply.
         timeout: time to wait for each try, s.
-        tries: how many times the call is sent while there is no answer; the id stays the same, so that it has its effect at most once.
+        tries: how many times the call is sent while there is no answer; all have the same id, so that the call takes effect at most once.
         fields: fields of the request.
     """
     payload = encode(request(v=VERSION, id=uuid.uuid4().hex, who=who, **fields))
@@ -75,9 +75,10 @@ def call(
 def flush(session: zenoh.Session, who: str) -> None:
     """Wait until the router has received every message sent so far, for at most 0.5 s (FLUSH_TIMEOUT).
 
-    Call this before a session is closed. Zenoh drops messages that it is sending when a session is closed, and a router drops what it has
-    not read when it cannot write to a closed connection. The call to the router has the lowest priority, so the router answers it after all
-    other messages; it does so even if no service answers this key. `who`: name of the calling process.
+    Call this before you close a session; otherwise messages can be lost. When a session is closed, Zenoh drops the messages that it is
+    still sending, and a router that cannot write to the closed connection drops the messages that it has not read. This function sends the
+    router a call with the lowest priority, which the router answers after all other messages, even if no service answers this key. `who`:
+    name of the calling process.
     """
     key, lowest = keys.service_rpc("router", "stat"), zenoh.Priority.BACKGROUND
     payload = encode(Empty(v=VERSION, id=uuid.uuid4().hex, who=who))
@@ -179,8 +180,8 @@ class Answering:
     def answer(self, query: zenoh.Query, declared: str, cls: type[_Q], handler: Callable[[_Q, str], Reply], part_of_key: bool) -> None:
         """Reply to a query with the result of handler(request, key), or with the refusal that the handler raises (CallRefused).
 
-        `declared`: the key, or key expression, under which the service answers. `cls`: type of the request. `part_of_key`: the key begins
-        with a part, and the part vectors of the request must have the length of that part.
+        `declared`: the key, or key expression, under which the service answers. `cls`: type of the request. `part_of_key`: True: the key
+        begins with the name of a part, and vectors over the motors of a part in the request must have the length of that part.
         """
         key = str(query.key_expr) if "*" in declared else declared  # answers to one call with a wildcard must differ by key
         with query:

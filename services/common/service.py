@@ -152,14 +152,17 @@ class Service(Listener):
         return type(error) is MobeeError or (isinstance(error, MobeeError) and not self._is_ready)
 
     def on_alive(self, handler: Callable[[str, str, bool], None]) -> None:
-        """Call `handler(service, instance, up)` when the liveliness token of a process appears (up: True) or disappears (up: False)."""
+        """Call `handler(service, instance, up)` when the liveliness token of a process appears (`up`: True) or disappears (`up`: False).
+
+        `service`: name of the process. `instance`: its id, which no other process has.
+        """
         self._on_alive.append(handler)
 
     def on_request(self, key: str, cls: type[_Q], handler: Callable[[_Q, str], Reply], part_of_key: bool = False) -> None:
         """Answer calls of `key` with the reply that handler(request, key) returns.
 
-        `cls`: type of the requests. The handler may raise CallRefused. `part_of_key`: the key begins with a part, and the part vectors of a
-        request must have the length of that part.
+        `cls`: type of the requests. The handler may raise CallRefused. `part_of_key`: True: the key begins with the name of a part, and
+        vectors over the motors of a part in the request must have the length of that part.
         """
 
         def enqueue(query: zenoh.Query) -> None:
@@ -174,7 +177,7 @@ class Service(Listener):
 
         `key`: key of the call on the bus (`bus_schema.keys`). `request`, `reply`: types of request and reply. `fields`: fields of the
         request. `timeout`: time for each try, s; None: 0.5 s, in lockstep 1.5 s. `tries`: how many times the call is sent while there is no
-        answer; it has its effect at most once.
+        answer; the call takes effect at most once.
         """
         return rpc.call(self.bus.session, self.who, key, request, reply, timeout=timeout or self.patience, tries=tries, **fields)
 
@@ -385,7 +388,7 @@ def _measured(value: float) -> int | float | None:
 def return_free_memory() -> None:
     """Return unused memory of this process to the system, if the C library can do so.
 
-    At the end of the start this is about 23 MB if meshes were read.
+    When a service has started, this is about 23 MB if it has read meshes.
     """
     trim = _malloc_trim()
     if trim is not None:

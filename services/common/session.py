@@ -69,10 +69,10 @@ def _config(namespace: str, lease: float, settings: dict[str, object]) -> zenoh.
 def end_unreceived(endpoint: str, lease: float) -> None:
     """Let the system end connections of this process at `endpoint` if the other side receives no data for `lease` [s].
 
-    Only Linux can do so; for an endpoint of this host nothing is changed, because such a connection cannot be interrupted, and a process
-    may get no processor for longer than the lease. Zenoh itself ends a silent connection after the lease, but with TLS only when the data
-    in its socket is sent, which may be long after an interrupted network works again. A listener gives the limit to the connections that it
-    accepts. A client must set it again after each new connection.
+    Only Linux can do so. For an endpoint of this host nothing is changed, because the network cannot interrupt such a connection, and a
+    process may get no processor for longer than the lease. Zenoh itself ends a silent connection after the lease; with TLS, however, it
+    first waits until the data in the socket is sent, which may be long after an interrupted network works again. Connections that a
+    listener accepts get the limit of the listener. A client must set the limit again for each new connection.
     """
     if not is_local(endpoint) and hasattr(socket, "TCP_USER_TIMEOUT"):
         _set_option(sockets_at(endpoint), socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, round(1e3 * lease))
@@ -81,8 +81,9 @@ def end_unreceived(endpoint: str, lease: float) -> None:
 def receive_together(sockets: Iterable[int], count: int) -> None:
     """Let the system wake this process for data of the connections `sockets` only when `count` bytes wait; only Linux can do so.
 
-    `sockets`: their file descriptors, as `sockets_at` returns them. With `count` = 1, all waiting data is received at once. The caller must
-    set 1 several times in a lease, because a connection counts as dead if nothing is received for a whole lease.
+    `sockets`: their file descriptors, as `sockets_at` returns them. With `count` = 1 the process is woken for any data, and now for the
+    data that already waits. The caller must set 1 several times per lease, because a connection from which nothing is received for a whole
+    lease counts as dead.
     """
     if sys.platform == "linux":
         _set_option(sockets, socket.SOL_SOCKET, socket.SO_RCVLOWAT, count)
@@ -132,7 +133,8 @@ def _ports(one: socket.socket) -> tuple[int, ...]:
 def spare_threads() -> None:
     """Restrict Zenoh to one thread in this process; call this before the first session.
 
-    In lockstep the services wait for one message after another. To pass each message from thread to thread takes a fifth of the time.
+    In lockstep the services wait for one message after another. With several threads, a fifth of the time is needed to pass messages from
+    one thread to the next.
     """
     os.environ.setdefault("ZENOH_RUNTIME", _ONE_THREAD)
 

@@ -33,7 +33,7 @@ class Raw(Struct, frozen=True, gc=False):
     def type(self) -> str:
         """The name of the message's type, such as State.
 
-        Empty for data that are no message of the contract, such as a recorded liveliness token.
+        Empty for data that have no message type of this project, such as a recorded liveliness token.
         """
         return type_of(self.encoding)
 

@@ -18,7 +18,8 @@ MOST_SUSPENSIONS = 5  # of one action: a part that is held again and again would
 class Owner:
     """The process that owns a part's goal (the right to set its attractor), as long as its liveliness token exists.
 
-    `who`: name of its service. `instance`: last chunk of its token. `epoch`: number of the ownership.
+    `who`: name of the service. `instance`: id of the process, the last chunk of its token. `epoch`: number of this ownership; each new
+    owner gets a larger one, and must send it with its calls.
     """
 
     who: str
@@ -66,9 +67,9 @@ class Action:
     def may_continue(self, t: float, gate: GateState) -> bool:
         """Return whether the action may continue when the part is under control again.
 
-        `t`: present time [s]. `gate`: state of the part's gate. In a hold the part stands still and does not follow the controller's
-        commands. A short hold leaves it at rest on the path to its goal. After an emergency stop or a fault, after a hold of more than 10
-        s, and at the sixth hold of the action, the part must not move to the old goal.
+        An action without a target cannot continue. Nor can one after an emergency stop or a fault, after a hold of more than 10 s, or at
+        the sixth hold of the action: the part must not move to an old goal then. In a hold the part stands still and does not follow the
+        controller's commands. `t`: present time [s]. `gate`: state of the part's safety gate in robot_sim.
         """
         if self.target is None or gate in ("estop", "fault"):
             return False
@@ -93,11 +94,11 @@ class Action:
         Args:
             k: tick.
             t: time of the tick, s.
-            speeds: commanded speeds of the part's motors, (n_part,) rad/s; for motors that slide, 1 rad is their fine unit
-                (`mobee.robot.motor_units`).
-            accelerations: commanded accelerations, (n_part,) rad/s^2, in the same units.
-            continues: if it returns True, as for a reach that still comes nearer, the status stays "moving" although the motion has
-                settled.
+            speeds: commanded speeds of the part's motors, (n_part,) rad/s; the speed of a motor that slides [m/s] must be divided by its
+                length in `mobee.robot.motor_units.fine_units`, which counts as 1 rad.
+            accelerations: commanded accelerations, (n_part,) rad/s^2, divided likewise for motors that slide.
+            continues: called when the motion has settled; if it returns True, for example because a marker still comes nearer to its
+                target, the status stays "moving".
         """
         if self._test is not None and self.status == "moving":
             verdict = self._test.update(t, speeds, accelerations)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Takes and arms the drives of all parts at robot_sim, and again after each hold."""
+"""Takes the drives of all parts (the rights to command their motors) at robot_sim, and arms them, also again after each hold."""
 
 from __future__ import annotations
 
@@ -20,11 +20,12 @@ CONFIRM_TIME = 0.1  # s within which the state of a part must show that it was a
 
 
 class Drives:
-    """Takes and arms the drives of all parts; a drive is the right to command the motors of one part.
+    """Takes and arms the drives of all parts, and knows whether robot_sim follows this controller's commands to them.
 
-    It also knows whether robot_sim follows this controller's commands. `epochs`: for each part, the number of this controller's ownership
-    of the drive, which each command must contain. No method waits for an answer, because the other parts need their commands while one is
-    being armed. Times are of the monotonic clock, in lockstep of the bus clock.
+    A drive is the right to command the motors of one part, which follow the commands when the drive is armed. `epochs`: for each part, the
+    number of this controller's ownership of the drive, which each command must contain; 0: the drive is not armed. No method waits for an
+    answer, because the other parts need their commands while one is being armed. Times are of the monotonic clock, in lockstep of the bus
+    clock.
     """
 
     def __init__(self, service: Service, robot: Robot) -> None:
@@ -61,7 +62,7 @@ class Drives:
         return self._now() < self._confirm_by[part]
 
     def forget(self) -> None:
-        """Drop the numbers of all ownerships (epochs) and all attempts in progress; call this at the start of a new run of robot_sim."""
+        """Set all epochs to 0, and abandon the take and arm calls in progress; call this at the start of a new run of robot_sim."""
         self.epochs = dict.fromkeys(self.epochs, 0)
         self._next_try = dict.fromkeys(self._next_try, 0.0)
         self._attempts.clear()
@@ -70,8 +71,8 @@ class Drives:
     def watch_stop(self, parts: Mapping[str, PartStatus]) -> None:
         """Read emergency stops from the bus; after a stop no part is armed until the safety gates show that the stop was reset.
 
-        A stop is repeated on the bus until robot_sim has latched it, and forgotten when it was reset at robot_sim. `parts`: the newest
-        status of each part.
+        The stop is published repeatedly until robot_sim has put it in force, and forgotten when it was reset at robot_sim. `parts`: the
+        newest status of each part.
         """
         now = time.monotonic()
         for message in self._line.take():
@@ -95,14 +96,14 @@ class Drives:
         return self._stop is not None
 
     def can_arm(self, state: PartStatus) -> bool:
-        """Return whether a part in this state may be taken and armed: no stop is in force, and its gate is idle, in hold or armed.
+        """Return whether the drive of a part may be taken and armed: no stop is in force, and its safety gate is idle, in hold or armed.
 
-        A part in hold stands still until it is armed; an armed one follows commands.
+        `state`: status of the part. With its gate in hold, a part stands still; with its gate armed, it follows commands.
         """
         return self._stop is None and state.gate in ("idle", "hold", "armed")
 
     def try_arm(self, part: str, state: PartStatus) -> None:
-        """Begin to take and arm a part; `is_armed` returns True when the part is armed.
+        """Begin to take and arm the drive of a part; `is_armed` returns True when it is armed.
 
         Nothing happens if the part cannot be armed (`can_arm`), if an attempt is in progress, or within 0.2 s of the last one.
         """

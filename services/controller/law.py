@@ -112,7 +112,7 @@ class RobotLaw:
     # One part
 
     def rest(self, part: str) -> None:
-        """Set a part that is not under control to rest at its measured position."""
+        """Set the commanded motion of a part that is not under control to rest at the part's measured position."""
         self._law.rest(part, self.q[self._where[part]])
 
     def brake(self, part: str) -> None:
@@ -149,7 +149,8 @@ class RobotLaw:
     def settle_speeds(self, part: str) -> tuple[Array, Array]:
         """Return commanded velocity and acceleration of the part's motors, (n_part,) each, by which the end of a motion is detected.
 
-        Units: rad/s and rad/s^2. For a motor that slides, 1 rad is its fine unit, a share of its range (`mobee.robot.motor_units`).
+        Units: rad/s and rad/s^2. The values of a motor that slides are divided by its length in `mobee.robot.motor_units.fine_units`, a
+        share of its range that counts as 1 rad.
         """
         where = self._where[part]
         return self._law.velocity[where] / self._units[where], self._law.acceleration[where] / self._units[where]

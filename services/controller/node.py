@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs the controller: once per tick, from the parts' states and the model's forces to the commands."""
+"""Runs the controller: once per tick, computes the commands from the parts' states and the model's forces."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class ControllerNode:
     """Waits for the forces of a tick, steps the control law, and commands the parts that are under control.
 
     Each object is changed only by its own methods: `RobotLaw` keeps the law's state, `Action` the goal and status of one part, `Drives` the
-    epochs at robot_sim, `Reaches` the reaches in progress.
+    ownership of the motors at robot_sim, `Reaches` the reaches in progress.
     """
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Precedence: from whom the goal of a part may be taken while it has an owner.
 
-The rule is in this file alone.  A behaviour runs beside the agents and uses what they leave free: everyone else may take its part at any
-time, and so may a behaviour of a higher rank.  It takes the part again when the part is free.  Between two of equal rank the first one
-keeps the part until it releases it or ends; two agents, clients or commands are of equal rank.
+The rule is in this file alone. A behaviour moves only parts that no agent, client or command uses: each of these may take the part from the
+behaviour at any time, and so may a behaviour of a higher rank. The behaviour takes the part again when the part is free. Agents, clients
+and commands are of equal rank: the first one keeps the part until it releases it or ends.
 """
 
 from __future__ import annotations

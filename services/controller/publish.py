@@ -22,7 +22,7 @@ PUBLISH_PERIOD = 0.01  # s of real time between two motions of a part in free mo
 
 
 class Counters:
-    """The counts of the controller since a measurement began, and the jitter of the control steps."""
+    """The counts of the controller since a measurement began, and the jitter of its steps (error of the time between two steps)."""
 
     def __init__(self) -> None:
         self.ticks = self.late_forces = self.held_ticks = self.long_gaps = 0
@@ -112,8 +112,9 @@ class CommandPublisher:
     def send(self, k: int, orders: dict[str, Order], reference: Array, answer: Answer | None = None) -> None:
         """Publish the commands of tick k, if there are any.
 
-        `orders`: dict from a part to the number of the controller's ownership of its drive (epoch) and the kind of command. `reference`:
-        (n,) rad, rad/s or N m, by the modality in the settings. `answer`: the answer to the tick in lockstep; None: not in this message.
+        `orders`: for each commanded part, the epoch (number of this controller's ownership of the part's drive) and the kind of command.
+        `reference`: (n,) rad, rad/s or N m, by the modality in the settings. `answer`: the answer to the tick in lockstep; None: not in
+        this message.
         """
         self._sent = k, orders
         if orders:
@@ -135,8 +136,9 @@ class CommandPublisher:
         """In lockstep, publish the commands of a tick, and answer the tick in the same message.
 
         The answer is sent later if a part is being armed. Tick 0, which is repeated, is answered only when all parts are ready and the
-        forces are fresh. `fresh`: whether the forces of the model may be used. `orders`: dict from a part to the number of the controller's
-        ownership of its drive (epoch) and the kind of command. `reference`: (n,) rad, rad/s or N m, by the modality in the settings.
+        forces are fresh. `fresh`: whether the forces of the model may be used. `orders`: for each commanded part, the epoch (number of this
+        controller's ownership of the part's drive) and the kind of command. `reference`: (n,) rad, rad/s or N m, by the modality in the
+        settings.
         """
         if tick.k == 0 and not (fresh and self._is_ready(tick)):
             return

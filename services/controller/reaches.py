@@ -28,9 +28,10 @@ ENDED_PERIODS = 10  # of these between two messages of a reach that has ended
 class Reach:
     """The last reach of a part: a force pulls a marker to a target.
 
-    `object`: name of the target in the model's world. `stay`: whether the part stays where the force ends. `end_k`: tick in which the force
-    ended; until then the newest tick. `q`, `position`: measured positions (n,) rad and position of the marker (3,) m, root frame, in that
-    tick. `settled`: whether the force ended because the part had settled. `touched`: world objects in contact with the part at that time.
+    `object`: name of the target in the model's world. `stay`: whether the part stays where the force ends. `q`, `position`: measured
+    positions (n,) rad and position of the marker (3,) m, root frame, at tick `end_k`. `end_k`: tick in which the force ended; while it
+    acts, the tick of the last measurement. `settled`: whether the force ended because the part had settled. `touched`: world objects in
+    contact with the part at that time.
     """
 
     action_id: str

@@ -52,8 +52,8 @@ class BusBody(BusFollower):
         Returns whether the arm has bumped into something, and the posture at that time, or at the end. `speed`: share of the motors'
         largest speed, above 0 and at most 1. `watch`: detects bumps; None: they are not detected. `forces`: function that takes a posture
         (n,) rad and returns the forces (n,) rad/s^2 of the control law except spring and damping. The attractors are shifted such that
-        their springs cancel these forces; None: they are not cancelled. After a bump the robot moves back along the path by 3 s of the
-        motion (BACK).
+        their springs cancel these forces; None: they are not cancelled. After a bump the robot moves back to the posture that it had 3 s
+        (BACK) before.
         """
         robot = self.robot
         rows = list(attractors(robot, timed(robot, np.clip(path, *robot.limits.T), self._gains, speed), self._gains, forces))

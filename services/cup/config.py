@@ -34,13 +34,13 @@ class Config(WorldConfig, frozen=True, kw_only=True):
     the thing."""
 
     def check_robot(self, robot: Robot) -> None:
-        """Raise MobeeError if the robot lacks the hand, if the thing stands on nothing, or if a part's name cannot be used on the bus."""
+        """Raise MobeeError if the robot lacks the hand, if the target stands on nothing, or if a part's name cannot be used on the bus."""
         super().check_robot(robot)
         Hand(robot, self.marker)
         self.ground()
 
     def ground(self) -> float:
-        """Return the height [m], root frame, of the surface on which the thing stands in the world's file.
+        """Return the height [m], root frame, of the surface on which the thing to fetch (`target`) stands in the world's file.
 
         Raises UnknownName if the world has no such thing, InvalidValue if no level box is below it.
         """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Fetches the cup: from the places that vision finds to motions of hand and arm, step by step; pauses where it does not see enough."""
+"""Fetches the cup: plans motions of hand and arm, step by step, from the places that vision finds; pauses after an error."""
 
 from __future__ import annotations
 

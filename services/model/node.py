@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs the model: once per tick, from the newest state of every part to the constraint forces."""
+"""Runs the model: once per tick, computes the constraint forces from the newest state of every part."""
 
 from __future__ import annotations
 

@@ -29,11 +29,10 @@ class Owner:
 
 
 class DriveServer:
-    """Forwards the drive calls of clients (take, arm, release, hold) to robot_sim, unless the reflex moves the robot.
+    """Forwards the drive calls of clients to robot_sim, unless the reflex moves the robot back after a violation.
 
-    The call hold stops a part.
-
-    A client gets the epoch (number of the ownership) that robot_sim has given to the filter. `epochs`: the epoch in force, by part.
+    The calls are take, arm, release, and hold, which stops a part. A client that takes a drive (the right to command a part's motors) gets
+    the epoch (number of the ownership) that robot_sim has given to the filter. `epochs`: the epoch in force, by part.
     """
 
     def __init__(self, service: Service, twin: Service, robot: Robot, refusal: Callable[[], str], on_arm: Callable[[], None]) -> None:

@@ -50,9 +50,9 @@ MAX_REMEMBERED = 1000  # commands in transit, at most
 
 
 class CommandStream:
-    """Publishes the commands of one part to robot_sim; commands of clients and of the reflex get numbers of one common sequence.
+    """Publishes the commands of one part to robot_sim; commands of clients and of the reflex are numbered in one common sequence.
 
-    It remembers which number the client gave to each of its commands.
+    For each command of a client it remembers the number that the client gave to the command.
     """
 
     def __init__(self, bus: Bus, part: str) -> None:
@@ -70,8 +70,8 @@ class CommandStream:
     def put(self, epoch: int, re_k: int, mode: Mode, reference: list[float], ttl: int) -> None:
         """Publish a command to robot_sim.
 
-        `epoch`: number of the drive's ownership. `re_k`: tick that the command answers. `reference`: positions [rad] or velocities [rad/s]
-        of the part's motors, by `mode`. `ttl`: lifetime [ms].
+        `epoch`: number of the ownership of the part's drive. `re_k`: tick of the state from which the command was computed. `reference`:
+        positions [rad] or velocities [rad/s] of the part's motors, by `mode`. `ttl`: lifetime [ms].
         """
         self._stream.put(epoch=epoch, re_k=re_k, mode=mode, ref=reference, ttl=ttl)
         self._seq += 1
@@ -88,7 +88,7 @@ class Streams:
     """Passes the states of all parts to the clients, and the clients' commands to robot_sim.
 
     `commands`: the stream of commands to robot_sim, by part. `is_stale`: the newest states are too old to check the pose, so that commands
-    are refused. `answered`: in lockstep, called when a message with commands also answers a tick.
+    are refused. `answered(commands, answer)`: called when a client's message with commands also contains its answer to a tick, in lockstep.
     """
 
     def __init__(

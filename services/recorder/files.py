@@ -82,7 +82,7 @@ class Files:
     def flush(self) -> None:
         """Hand all data to the operating system, so that they are kept even if this process is killed.
 
-        A file that has reached its share of the largest size is ended.
+        A file that is larger than 1/128 (FILES) of the largest size of the recording is ended; the next message begins a new file.
         """
         if self._file is None:
             return

@@ -91,9 +91,9 @@ PER_TICK: tuple[type[Message], ...] = (
 def queues(everything: bool, locked: bool) -> dict[str, int]:
     """Return the key expressions of the streams to record, each with the number of messages that may wait in its queue.
 
-    `everything`: also the streams in FOR_SUBSCRIBERS. `locked`: True: the sizes for lockstep. Streams with few messages get short queues:
-    Zenoh allocates 0.25 kB per place, and the memory of each place is used when the first message is put there, so a long queue would grow
-    for hours.
+    `everything`: also the streams that are published only for subscribers (FOR_SUBSCRIBERS). `locked`: in lockstep the queues are longer.
+    Streams with few messages get short queues: Zenoh allocates 0.25 kB per place, and the memory of each place is used when the first
+    message is put there, so a long queue would grow for hours.
     """
     most, others = (LOCKED_CAPACITY, OTHER_LOCKED_CAPACITY) if locked else (CAPACITY, OTHER_CAPACITY)
     recorded = (cls for cls in streams() if everything or cls not in FOR_SUBSCRIBERS)
@@ -103,7 +103,7 @@ def queues(everything: bool, locked: bool) -> dict[str, int]:
 def frequent_keys(parts: Iterable[str], everything: bool) -> list[str]:
     """Return the keys that contain a variable, such as {part}, and have a message in every tick.
 
-    `parts`: parts of the robot. `everything`: also the streams in FOR_SUBSCRIBERS.
+    `parts`: parts of the robot. `everything`: also the streams that are published only for subscribers (FOR_SUBSCRIBERS).
     """
     recorded = (cls for cls in PER_TICK if cls.stream.variable and (everything or cls not in FOR_SUBSCRIBERS))
     return [cls.stream.key(name) for cls in recorded for name in (("model",) if cls is Forces else parts)]

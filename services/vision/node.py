@@ -35,9 +35,9 @@ DIGITS = 3  # of published sizes, m: the model need not make a new shape in each
 
 
 class VisionNode:
-    """Locates things in the pictures of two cameras, when both pictures and both camera messages of a tick have arrived.
+    """Locates things in the pictures of two cameras, when both pictures and both `Camera` messages of a tick have arrived.
 
-    Besides these it reads only the clock.
+    It reads no other messages, except the clock.
     """
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:

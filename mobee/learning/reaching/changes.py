@@ -32,7 +32,8 @@ class Detector(Protocol):
     def add(self, learned: float, unknown: float) -> int | None:
         """Process one outcome; if a change is detected now, return the number of outcomes since the change, with this one, else None.
 
-        `learned`: probability, or density, of the outcome according to what was learned. `unknown`: the same without any knowledge.
+        `learned`: probability, or density, of the outcome according to what was learned. `unknown`: its probability, or density, if nothing
+        was learned.
         """
         ...
 
@@ -156,7 +157,7 @@ class WorldChanges:
         """Return the probabilities of a step's outcome for `Detector.add`, according to what was learned and without knowledge.
 
         Call it before the step is learned. For a reach they are densities of its reward. None if a transition ended in contact with the
-        target, because its outcome then informs about the target. `target`: (3,) m. `goal`: the goal state of a transition.
+        target, because the target may then have caused its outcome. `target`: (3,) m. `goal`: the goal state of a transition.
         """
         if step.a == REACH:
             variance = self._variance(step.s, target)

@@ -38,7 +38,7 @@ class Histories:
     Args:
         actions: number of actions.
         scale: unit of distances between targets, m.
-        near: m; `average` ignores targets that are farther than this from its target.
+        near: m; `average` ignores values whose target is farther than this from the target given to it.
     """
 
     def __init__(self, actions: int, scale: float, near: float = np.inf) -> None:

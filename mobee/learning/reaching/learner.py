@@ -33,7 +33,7 @@ class ReachSettings(Settings):
         predictor: predicts rewards of reaches: a name in `predictors.PREDICTORS` ("weighted" is that of the thesis), a class or function
             that makes a predictor from the `Reaches`, the text `module:name` of such a class or function, or a `RewardPredictor` that has
             learned nothing yet.
-        strategy: computes the rewards of reaches for which the agent plans while it learns: a name in `strategies.STRATEGIES` ("intrinsic",
+        strategy: computes the rewards of reaches in the agent's plans while it learns: a name in `strategies.STRATEGIES` ("intrinsic",
             "greedy" and "random" are those of the thesis), a class or function that makes a strategy, see `strategies.StrategyOf`, or the
             text `module:name` of such a function.
         failures: the targets for which a failed transition counts: "spread": all targets, as published; "local": targets within 25 mm;
@@ -44,7 +44,7 @@ class ReachSettings(Settings):
         discount: factor of future rewards in plans.
         scale: unit of the distances in thesis eqs. 8.1, 8.4, 8.5 and 8.7, m.
         penalty: reward of a failed transition, below 0.
-        limit: number of actions after which a problem-try ends, the reach included.
+        limit: number of actions after which a problem-try (one attempt to reach a target) ends, the reach included.
         seed: seed of all random choices; with the same seed, agents of different parts choose differently.
     """
 
@@ -69,8 +69,8 @@ class ReachLearner:
         space: states and transitions of the part.
         reaches: the marker's position in each state, and the unit of distances.
         settings: settings of the learner.
-        beliefs: outcomes of transitions, with which plans are made; None: the outcomes of `model`, or of an untrained model, without
-            imagined outcomes.
+        beliefs: outcomes of transitions, with which plans are made; None: `debiased()` of `model`, or of an untrained model if `model` is
+            None.
         model: transition model that is learned at the same time; None: none.
 
     Raises:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plans that end in a reach: every state has one more action, the reach, after which the problem-try ends (thesis 8.2, 8.3.1)."""
+"""Plans that end in a reach: every state has one more action, the reach, after which the plan ends (thesis 8.2, 8.3.1)."""
 
 from __future__ import annotations
 
@@ -89,8 +89,9 @@ class ReachPlan:
 def plan_reach(space: Space, planning: ReachPlanning, expected: Array, failures: Array, start: int) -> ReachPlan:
     """Compute the path from the state `start`, and the reach at its end, that have the highest value.
 
-    `expected`: (S,) expected rewards of the reaches, at least 0, because the best plan never makes a reach of negative reward. `failures`:
-    (S, A) rewards of the transitions, below 0 for those that have failed. Raises InvalidValue if the space has no such state.
+    `expected`: (S,) expected rewards of the reaches; give 0 in place of a negative one, because the best plan makes no reach of negative
+    reward. `failures`: (S, A) rewards of the transitions, below 0 for those that have failed. Raises InvalidValue if the space has no such
+    state.
     """
     space.actions(start)
     path, actions, probabilities = _best_path(planning, start, *planning.values(expected, failures))

@@ -90,7 +90,7 @@ class ReachAgent(ReachLearner):
         return self._state
 
     def try_problem(self, target: ReachTarget) -> Try:
-        """Make one problem-try and return it: move to the state from which the plan reaches, then reach for the target (thesis 8.3.1).
+        """Make one problem-try and return it: move to the state that the plan chose, then reach for the target (thesis 8.3.1).
 
         The agent presents the target to the plant, plans again after failed transitions, and learns from every step. Raises
         ActionInterrupted if the plant does; the problem-try then stays under way, and the next call for the same position continues it.
@@ -103,9 +103,9 @@ class ReachAgent(ReachLearner):
         return self.last
 
     def learn(self, problems: Sequence[ReachTarget], tries: int) -> None:
-        """Make `tries` more problem-tries, each for the problem with the fewest tries; if several have it, for a random one (thesis 8.3.2).
+        """Make `tries` more problem-tries, each for the problem with the fewest tries (thesis 8.3.2).
 
-        After an interrupted action the agent decides again.
+        If several problems have the fewest tries, a random one of them is chosen. After an interrupted action the agent decides again.
         """
         end = self.tries + tries
         while self.tries < end:

@@ -19,10 +19,11 @@ RANDOM_SHARE = 0.2  # of the problem-tries, which reach from a random state
 
 
 class Progress:
-    """A strategy for learning progress: the reward of a reach from a state is how much this state's rewards have changed recently.
+    """A strategy for learning progress: the reward of a reach in plans is how much the observed rewards from its state have changed.
 
-    The mean of the newer half of its last eight rewards is compared with that of the older half; the reward is 1 if it has fewer than two.
-    In one of five problem-tries (attempts to reach one target) the reward is 1 for a random state and 0 for all others.
+    Of the last eight rewards observed from a state, the mean of the newer half is compared with that of the older half; with fewer than two
+    observed rewards the reward in plans is 1. In one of five problem-tries (attempts to reach one target) it is 1 for a random state and 0
+    for all others.
     """
 
     def __init__(self, reaches: Reaches, predictor: RewardPredictor) -> None:
@@ -53,9 +54,9 @@ OPTIMISM = 2.0  # standard deviations that `ucb` adds to the expected reward
 
 
 class Strategy(Protocol):
-    """Computes the rewards of the reach actions for which a learner plans while it learns.
+    """Computes the rewards that the reach actions have in a learner's plans while it learns, in place of the observed rewards.
 
-    The rewards must depend only on the reaches that were added and on the random generator; the method `rewards` must change nothing.
+    These rewards must depend only on the reaches that were added and on the random generator; the method `rewards` must change nothing.
     """
 
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:
@@ -107,7 +108,7 @@ class Greedy:
 
 
 class Intrinsic:
-    """A strategy: the reward of a reach is the prediction error that the predictor's earlier errors suggest (thesis eqs. 8.6 and 8.7)."""
+    """A strategy: the reward of a reach is the expected prediction error: the average of earlier errors (thesis eqs. 8.6 and 8.7)."""
 
     def __init__(self, reaches: Reaches, predictor: RewardPredictor) -> None:
         self._errors = Histories(len(reaches), reaches.scale)

@@ -38,7 +38,7 @@ class Problems:
         return number
 
     def least_tried(self, targets: Sequence[ReachTarget], rng: np.random.Generator) -> ReachTarget:
-        """Return the target with the fewest problem-tries; if several have it, a random one of them (thesis 8.3.2).
+        """Return the target with the fewest problem-tries; if several have equally few, a random one of them (thesis 8.3.2).
 
         Raises InvalidValue if `targets` is empty. A problem-try is one attempt to reach one target.
         """
@@ -60,11 +60,11 @@ class Step:
     """One action of a problem-try (attempt to reach one target): a transition, or the reach.
 
     `n`: number of the step, 1, 2, ... `number`: number of its problem-try, 1, 2, ... `problem`: number of its target, 0, 1, ... `s`,
-    `s_next`: states before and after. `a`: the action of a transition, or REACH (-1). `failed`: whether a transition led to no state of
-    higher value. `reward`: the reward of a reach (thesis eq. 8.4); for a transition 0, or the penalty if it failed. `expected`: the reward
-    predicted before a reach; 0 for a transition. `missing`: m, remaining distance after a reach; 0 for a transition. `settled`: False after
-    a timeout. `duration`: s, by the plant's clock. `q`: (n_part,) rad, all motors of the part at the end (for a reach: when its force
-    ended). `touched`: names of the world objects that the robot touched at the end.
+    `s_next`: states before and after. `a`: the action of a transition, or REACH (-1). `failed`: whether a transition led to a state whose
+    value in the plan was not higher than that of `s`. `reward`: the reward of a reach (thesis eq. 8.4); for a transition 0, or the penalty
+    if it failed. `expected`: the reward predicted before a reach; 0 for a transition. `missing`: m, remaining distance after a reach; 0 for
+    a transition. `settled`: False after a timeout. `duration`: s, by the plant's clock. `q`: (n_part,) rad, all motors of the part at the
+    end (for a reach: when its force ended). `touched`: names of the world objects that the robot touched at the end.
     """
 
     n: int

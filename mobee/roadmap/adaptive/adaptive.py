@@ -37,7 +37,7 @@ class AdaptiveRoadmap:
         both_ways: whether an observation of an edge also counts for the edge in the opposite direction.
 
     Raises:
-        InvalidValue, UnknownName: an argument is not valid; the message says what is.
+        InvalidValue, UnknownName: an argument is not valid; the message states the valid values.
     """
 
     def __init__(self, space: Space, mode: Mode = "remove", forgetting: float = 1.0, both_ways: bool = False) -> None:
@@ -65,7 +65,7 @@ class AdaptiveRoadmap:
 
     @property
     def unexplored(self) -> Ints:
-        """The edges that were never tried, shape (E, 2): numbers of state (vertex) and action (column of `space.goals`)."""
+        """The edges that were never tried, shape (E, 2): each row has the start vertex (state) and the action (column of `space.goals`)."""
         return np.argwhere((self.space.goals != NO_ACTION) & (self.beliefs.tried == 0))
 
     @property
@@ -145,9 +145,9 @@ class AdaptiveRoadmap:
         return found
 
     def next_target(self, start: int, rng: np.random.Generator) -> int | None:
-        """Draw the vertex to explore next; its probability is proportional to its number of untried edges (thesis 4.3.1).
+        """Draw the vertex to explore next, with a probability proportional to the number of its untried edges (thesis 4.3.1).
 
-        Only vertices that can be reached from `start` are drawn. Returns None if all of their edges were tried.
+        Only vertices that can be reached from `start` are drawn. Returns None if all edges of these vertices were tried.
         """
         untried = np.bincount(self.unexplored[:, 0], minlength=len(self)) * self.reachable(start)
         total = int(untried.sum())

@@ -84,8 +84,8 @@ class EdgeBeliefs:
     def moved(self, goals: Ints, states: Ints, actions: Ints, before: tuple[Ints, Ints]) -> EdgeBeliefs:
         """Return a copy of these beliefs for a changed graph with the table `goals` (S', A').
 
-        `states`, `actions` (E,): positions in the new table of the edges that remain. `before`: positions (states, actions) of the same
-        edges in the old table. All other edges of the new table start without observations.
+        `states`, `actions` (E,): rows and columns in the new table of the E edges that are in both tables. `before`: (rows, columns) of the
+        same edges in the old table. All other edges of the new table start without observations.
         """
         found = EdgeBeliefs(goals, self.mode, self.forgetting)
         for name in ("worked", "failed", "tried", "last"):

@@ -26,7 +26,7 @@ class MapExplorer(Walker):
     """A `Walker` that moves to untried edges of an adaptive roadmap until all reachable edges were tried.
 
     A vertex may have feasible edges that lead to it and none that leave it. At such a vertex the explorer queries a path to a vertex with
-    untried edges, and adds this path to the map. An explorer that is started again with its store continues.
+    untried edges, and adds this path to the map. A new explorer with the same store continues where the last one stopped.
 
     Args:
         roadmap: the map, which the explorer changes.

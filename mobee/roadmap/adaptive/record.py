@@ -26,8 +26,8 @@ CREATE TABLE IF NOT EXISTS map_changes (
 class Change:
     """A recorded change of an adaptive roadmap.
 
-    `n`: number of transitions before the change. `what`: name of the method of AdaptiveRoadmap ("grow", "join" or "prune"). `given`: the
-    arguments of the method by name, as plain JSON values.
+    `n`: number of observed tries of edges (transitions) before the change. `what`: name of the method of AdaptiveRoadmap ("grow", "join" or
+    "prune"). `given`: the arguments of the method by name, as plain JSON values.
     """
 
     n: int
@@ -36,7 +36,7 @@ class Change:
 
 
 class MapStore(TransitionStore):
-    """A TransitionStore that also records the changes of an adaptive roadmap between the transitions.
+    """A TransitionStore of observed tries of edges (transitions) that also records the changes of the adaptive roadmap between them.
 
     Args:
         path: the SQLite file of the run; it is created if it does not exist.

@@ -61,7 +61,7 @@ def build_roadmap(
         progress: called several times per second with the vertices and evaluations so far.
 
     Raises:
-        InvalidValue, UnknownName: an argument is not valid; the message says what is.
+        InvalidValue, UnknownName: an argument is not valid; the message states the valid values.
         MobeeError: no first pose was found, the file has other settings or cannot be written, or the world has changed.
     """
     problem = Problem(model, _with_contacts(costs), start, motors, settings.margin)

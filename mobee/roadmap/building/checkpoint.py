@@ -47,7 +47,7 @@ def request(model: Model, problem: Problem, task: Task, spacing: Array, others: 
 
 
 def digest(requested: Mapping[str, Any]) -> str:
-    """Return 16 hex digits that identify the settings `requested`, as `request` returns them."""
+    """Return a hash (16 hex digits) of the settings `requested`, as `request` returns them."""
     return hashlib.sha256(json.dumps(requested, sort_keys=True).encode()).hexdigest()[:16]
 
 
@@ -71,8 +71,8 @@ _PREFIX = "front_"  # of the names of arrays that only the building needs
 class Progress:
     """Progress of building a roadmap.
 
-    `vertices`: number of vertices found. `evaluations`: number of poses evaluated. `open`: number of vertices from which a search may still
-    start, or of lattice points that are still to be tried. `seconds`: time spent, in s.
+    `vertices`: number of vertices found. `evaluations`: number of poses evaluated. `open`: work that is left: number of vertices from which
+    an evolution-strategy search may still start, or of lattice points that least squares must still try. `seconds`: time spent, in s.
     """
 
     vertices: int

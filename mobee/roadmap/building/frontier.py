@@ -73,8 +73,9 @@ _BORDER = 1e-9  # barycentric: points on the border are inside
 class SimplexRegion:
     """The region of a task space that is covered by simplices (R of thesis Algorithm 4).
 
-    All points are task coordinates divided by the spacing of the roadmap, so corners of a simplex are about 1 apart.
-    A simplex is stored as its first corner, the origin, and the inverse of the matrix of its edges. `dimensions`: m of the task space.
+    All points are task coordinates divided by the spacing of the roadmap, so corners of a simplex are about 1 apart. A simplex is stored as
+    its first corner, the origin, and the inverse of the matrix whose columns are its edges from this corner. `dimensions`: m of the task
+    space.
     """
 
     def __init__(self, dimensions: int) -> None:
@@ -85,7 +86,7 @@ class SimplexRegion:
         return len(self._origins)
 
     def add(self, corners: Array) -> Array | None:
-        """Add a simplex by its corners (m + 1, m); return the inverse (m, m) of the matrix of its edges from the first corner.
+        """Add a simplex by its corners (m + 1, m); return the inverse (m, m) of the matrix whose columns are its edges from the first one.
 
         Returns None, and adds nothing, if the simplex is nearly flat (its determinant, in spacings, is below MIN_DETERMINANT = 0.05).
         """
@@ -116,7 +117,8 @@ class SimplexRegion:
 def inside_simplex(points: Array, origins: Array, inverses: Array) -> Flags:
     """Return whether points (..., m) lie inside simplices, (...,).
 
-    `origins` (..., m): first corners of the simplices. `inverses` (..., m, m): inverses of the matrices of their edges.
+    `origins` (..., m): first corners of the simplices. `inverses` (..., m, m): inverses of the matrices whose columns are the edges from
+    these corners.
     """
     barycentric = np.einsum("...ij,...j->...i", inverses, points - origins)
     found: Flags = (barycentric >= -_BORDER).all(axis=-1) & (barycentric.sum(axis=-1) <= 1.0 + _BORDER)
@@ -131,9 +133,9 @@ MAX_NEIGHBOURS = 1.5  # spacings from a new vertex to the furthest of the n near
 class Frontier:
     """Vertices V, edges E, region R and expansion weights of thesis Algorithm 4, in task coordinates divided by the spacing.
 
-    A direction of a vertex is free if the point one spacing away is inside the box, keeps MIN_DISTANCE (0.8) to all vertices and is not
-    covered by a simplex. The free directions of all vertices are updated with each new vertex, so that no search is started that cannot
-    succeed. `low`, `high`: (m,) corners of the task's box, in spacings. m is the dimension of the task space.
+    A direction at a vertex is free if the point one spacing away in this direction is inside the box, is at least MIN_DISTANCE (0.8
+    spacings) from all vertices, and is not covered by a simplex. The free directions of all vertices are updated with each new vertex.
+    `low`, `high`: (m,) corners of the task's box, in spacings. m is the dimension of the task space.
     """
 
     def __init__(self, low: Array, high: Array) -> None:
@@ -156,17 +158,21 @@ class Frontier:
 
     @property
     def weights(self) -> Array:
-        """Expansion weights of the vertices, (V,), 1 at first; a writable view: the caller lowers the weight after a failed search."""
+        """Expansion weights of the vertices, (V,), 1 at first.
+
+        Searches start first at vertices with larger weights, and never at a weight of 0 or less. The array is a writable view: the caller
+        lowers the weight of the start vertex after a failed search.
+        """
         return self._weights.rows
 
     @property
     def free(self) -> Flags:
-        """Whether each of the D `directions` is free at each vertex, (V, D)."""
+        """Whether each of the D `directions` is free at each vertex, (V, D): whether a search may aim at the point one spacing away."""
         return self._free.rows
 
     @property
     def edges(self) -> Ints:
-        """Edges (E, 2): each vertex is joined to the m vertices that were nearest to it when it was added (Algorithm 4)."""
+        """Edges (E, 2), the older vertex first: each vertex is joined to the m vertices nearest to it when it was added (Algorithm 4)."""
         found: Ints = self._edges.rows
         return found
 
@@ -193,10 +199,10 @@ class Frontier:
         )
 
     def add(self, point: Array) -> Array | None:
-        """Add a vertex at a point (m,), its edges to the m nearest vertices, and the simplex of the new vertex and these m.
+        """Add a vertex at a point (m,), its edges to the m nearest vertices, and the simplex whose corners are all of these.
 
-        Returns the inverse (m, m) of the matrix of the simplex's edges; None if there are fewer than m other vertices, or if the simplex is
-        flat.
+        Returns the inverse (m, m) of the matrix whose columns are the simplex's edges from the new vertex; None if there are fewer than m
+        other vertices, or if the simplex is flat.
         """
         number, n = len(self), self.dimensions
         corners, _ = self.nearest(point, n)

@@ -117,7 +117,7 @@ class FrontierBuilder:
     """Grows a roadmap by searches with an evolution strategy (thesis Algorithms 3 and 4).
 
     Each `step` computes one generation of every search and adds the vertices that the searches found. `frontier`: the vertices in the task
-    space, in spacings. `rng`: draws all random numbers. `problem`: counts the evaluations.
+    space, in spacings. `rng`: draws all random numbers. `problem`: the pose search problem, which also counts the evaluated poses.
     """
 
     def __init__(self, evaluator: PoseEvaluator, settings: SearchSettings, rng: np.random.Generator) -> None:

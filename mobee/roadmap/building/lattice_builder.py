@@ -25,9 +25,10 @@ _ROUNDING = 1e-9  # spacings
 class Lattice:
     """The points of a lattice in a box of a task space; neighbours are one spacing apart, and one point is the middle of the box.
 
-    A point is a tuple of m whole numbers, which count half edges of the lattice from the middle of the box. If all numbers are even, it is
-    a lattice point; otherwise it is an intermediate point, half-way between lattice points. Intermediate points fill the gaps that the
-    lattice leaves at the border of the reachable region. `box`: (m, 2), `spacing`: (m,), in the units of the task coordinates.
+    A point is a tuple of m whole numbers p: its place is the middle of the box plus the sum of p[i] / 2 times basis vector i of the
+    lattice. If all numbers are even, it is a lattice point; otherwise it is an intermediate point, half-way between lattice points.
+    Intermediate points fill the gaps that the lattice leaves at the border of the reachable region. `box`: (m, 2), `spacing`: (m,), in the
+    units of the task coordinates.
     """
 
     def __init__(self, box: Array, spacing: Array) -> None:
@@ -44,7 +45,7 @@ class Lattice:
     def y(self, points: Ints) -> Array:
         """Return the task coordinates (N, m) of lattice or intermediate points, each in the unit of its coordinate (for example m or rad).
 
-        `points`: (N, m) whole numbers, which count half edges of the lattice from the middle of the box.
+        `points`: (N, m) whole numbers, multiples of half of each basis vector of the lattice, from the middle of the box.
         """
         found: Array = self._origin + (points @ self._edges) * self._spacing
         return found
@@ -52,30 +53,30 @@ class Lattice:
     def neighbours(self, points: Ints) -> list[list[Point]]:
         """Return for each point a list of the lattice points in the task's box at most one spacing away, without the point itself.
 
-        `points`: (N, m) whole numbers, which count half edges of the lattice from the middle of the box; a point in the result is a tuple
-        of m such numbers.
+        `points`: (N, m) whole numbers, multiples of half of each basis vector of the lattice, from the middle of the box; a point in the
+        result is a tuple of m such numbers.
         """
         return self._shifted(points, self._neighbours, lattice_only=True)
 
     def intermediate(self, points: Ints) -> list[list[Point]]:
         """Return for each lattice point a list of the intermediate points in the task's box that are half a spacing away.
 
-        `points`: (N, m) whole numbers, which count half edges of the lattice from the middle of the box; a point in the result is a tuple
-        of m such numbers.
+        `points`: (N, m) whole numbers, multiples of half of each basis vector of the lattice, from the middle of the box; a point in the
+        result is a tuple of m such numbers.
         """
         return self._shifted(points, self._halves, lattice_only=False)
 
     def too_close(self, point: Point) -> list[Point]:
         """Return the lattice and intermediate points nearer than MIN_DISTANCE (0.8 spacings) to a point, also those outside the box.
 
-        Each point is a tuple of m whole numbers, which count half edges of the lattice from the middle of the box.
+        Each point is a tuple of m whole numbers, multiples of half of each basis vector of the lattice, from the middle of the box.
         """
         return [tuple(a + b for a, b in zip(point, offset, strict=True)) for offset in self._close]
 
     def nearest(self, y: Array) -> Ints:
         """Return for each of N task coordinates y (N, m) a lattice point in the task's box that is approximately the nearest one.
 
-        The result (N, m) has whole numbers, which count half edges of the lattice from the middle of the box.
+        The result (N, m) has whole numbers, multiples of half of each basis vector of the lattice, from the middle of the box.
         """
         scaled = np.clip((y - self._origin) / self._spacing, -self._width, self._width)
         edges = 0.5 * scaled @ np.linalg.inv(self._edges)
@@ -120,7 +121,7 @@ def _offsets(dimensions: int) -> Ints:
 class FailedPoint:
     """A lattice point, or a point half-way between lattice points, for which no valid pose was found so far.
 
-    `q`: (n,) rad, the best posture found; before the first try of a point half-way, the posture of the lattice point beside it.
+    `q`: (n,) rad, the best posture found; for an intermediate point that was not tried yet, the posture of the lattice point beside it.
     `violation`: sum of weight times residual of this posture over the terms beyond their tolerances; infinite if least squares has found no
     posture at the point. `left`: number of tries left.
     """
@@ -134,9 +135,9 @@ class PointTable:
     """The status of the points of a `Lattice`: which were reached, are to be tried, or have failed.
 
     `vertex`: dict from each point that was reached to the number of its vertex. `q`, `y`: lists of the poses (n,) rad and task coordinates
-    (m,) of the vertices, by number. `untried`: dict from each lattice point next to a vertex to the vertices from whose postures it is
-    still to be tried. `failed`: dict from each point without a valid pose so far to its `FailedPoint`. `intermediate`: the points half-way
-    between lattice points that were tried or are to be tried.
+    (m,) of the vertices, by number. `untried`: dict whose keys are lattice points next to vertices; the value lists the vertices from whose
+    postures least squares must still try to reach the point. `failed`: dict from each point without a valid pose so far to its
+    `FailedPoint`. `intermediate`: the points half-way between lattice points that were tried or are to be tried.
 
     Args:
         motors: number n of motors of the robot.
@@ -275,14 +276,15 @@ class LatticeBuilder:
 
     @property
     def open(self) -> int:
-        """Number of lattice points next to vertices that are still to be tried from a vertex's posture."""
+        """Number of lattice points that least squares must still try to reach from the posture of a vertex next to them."""
         return len(self._table.untried)
 
     def step(self) -> bool:
         """Search for poses at the next points of the lattice; return False if the building is finished.
 
-        A step tries points next to vertices; if there are none, failed points again; then it adds points half-way between lattice points;
-        at last it tries random points, and the building is finished when none of these is reached. Also False without a first pose.
+        A step tries the points next to vertices. If there are none, it tries failed points again; if none is left, it adds points half-way
+        between lattice points; then it tries random points. The building is finished when no random point is reached, or if no first pose
+        is found.
         """
         if not self.vertices:
             return self._find_first()

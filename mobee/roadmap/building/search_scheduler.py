@@ -37,7 +37,7 @@ class SearchScheduler:
 
     Args:
         frontier: the vertices in the task space.
-        postures: (V, d) positions of the free motors at the vertices, in fractions of their ranges.
+        postures: (V, d) positions of the motors that may move, at the vertices, in fractions of their ranges.
         start: (d,) posture at which the search for the first pose begins, in fractions of the ranges.
         settings: settings of the searches.
         population: number of samples per generation.
@@ -103,7 +103,7 @@ class SearchScheduler:
         """End the search `number`, which has found a vertex, and all searches whose aims the new vertex makes useless.
 
         An aim is useless if it is nearer than 0.8 spacings to the new vertex or inside its simplex; such a search does not count as failed.
-        `point`: (m,) of the new vertex, in spacings. `simplex`: (m, m) inverse of the edges of its simplex, or None.
+        `point`: (m,) of the new vertex, in spacings. `simplex`: (m, m) as `Frontier.add` returns it for this vertex, or None.
         """
         if self.vertex[number] >= 0:
             self._ages.append(self.searches.age[number])

@@ -27,8 +27,8 @@ class SearchSettings:
         std: largest standard deviation of a search from a vertex, in ranges of the motors.
         wide_std: standard deviation of a search for the first pose, or where another search has failed, in ranges of the motors.
         population: samples per generation; None: 4 + 3 ln(d) for d motors that may move.
-        patience: a search fails after this factor times the number of generations within which 3/4 of the recent searches succeeded.
-        tries: failed searches within half a spacing of a point, after which the point is not tried again.
+        patience: a search fails after this factor times G generations, where 3/4 of the recent successful searches needed at most G.
+        tries: number of failed searches with aims within half a spacing of a point, after which no search aims at this point.
         searches: number of simultaneous searches.
     """
 

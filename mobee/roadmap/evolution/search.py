@@ -39,12 +39,12 @@ class Searches:
         self.shape[number], self.path[number] = np.eye(len(mean)), 0.0
 
     def ask(self, which: Ints, z: Array) -> Array:
-        """Return samples (k, population, d) of the k searches with the numbers `which`; `z`: standard normal samples of the same shape."""
+        """Return samples (k, population, d) of the searches with indices `which` (k,); `z`: standard normal samples of the same shape."""
         samples: Array = self.mean[which, None] + self.sigma[which, None, None] * (z @ self.shape[which].transpose(0, 2, 1))
         return samples
 
     def tell(self, which: Ints, z: Array, costs: Array) -> None:
-        """Update the distributions of the k searches with the numbers `which`.
+        """Update the distributions of the k searches with the indices `which` (k,).
 
         `z`: (k, population, d), the standard normal samples given to `ask`. `costs`: (k, population) of these samples; the lowest is best.
         """
@@ -85,10 +85,12 @@ EVALUATIONS = 100_000
 
 @dataclass(frozen=True, slots=True)
 class Restart:
-    """When a search restarts, with two conditions. Restarts begin in turn at a random point of the box and at the search's first start.
+    """Two conditions, of which each restarts a search: a narrow distribution, and a cost that no longer decreases.
 
-    `std`: restart if the largest standard deviation is below this fraction of the box. `patience`, `gain`: restart if `patience`
-    generations have not lowered the best cost by the fraction `gain`.
+    Restarts begin alternately at a random point of the box and at the first start of the search.
+
+    `std`: restart if the largest standard deviation is below this fraction of the box's width. `patience`, `gain`: restart if `patience`
+    generations have not lowered the best cost since the last start by the fraction `gain`.
     """
 
     std: float = 1e-3
@@ -112,7 +114,8 @@ class Minimum:
 class Search:
     """A search in a box: `ask` returns a generation of samples, `tell` updates the search by their costs.
 
-    `best` and `best_cost` are the best sample (d,) of all generations and its cost; `evaluations` and `starts` count samples and starts.
+    `best` and `best_cost` are the best sample (d,) of all generations and its cost; `evaluations` and `starts` are the numbers of evaluated
+    samples and of starts.
 
     Args:
         start: (d,) first mean of the search distribution.
@@ -124,7 +127,7 @@ class Search:
         seed: seed of the random numbers, or a generator that draws them.
 
     Raises:
-        InvalidValue, UnknownName: an argument is not valid; the message says what is.
+        InvalidValue, UnknownName: an argument is not valid; the message states the valid values.
     """
 
     def __init__(

@@ -114,9 +114,9 @@ def orientation(
     """Return the term for the orientation of a marker (table 3.1). The residual is the remaining angle [rad].
 
     `goal`: a direction (3,), root frame, to which the marker's normal is turned; or a rotation (3, 3) of the marker, root frame.
-    `direction`: (3,) in the marker's frame, is used instead of the normal. The printed residual u.u* + 1 is not used: it is smallest for
-    opposite directions, and its slope is 0 at both ends. A residual of at most `tolerance` (5 degrees) meets the term; the cost is `weight`
-    (2 per rad) times the residual.
+    `direction`: (3,) in the marker's frame, is used instead of the normal. The residual that the thesis prints, u.u* + 1, is not used: it
+    is smallest for opposite directions, and its slope is 0 at both ends. A residual of at most `tolerance` (5 degrees) meets the term; the
+    cost is `weight` (2 per rad) times the residual.
     """
     wanted = np.array(goal, dtype=np.float64)
     if wanted.shape == (3, 3):
@@ -263,7 +263,7 @@ def balance(place: ArrayLike | None = None, tolerance: float | None = None, weig
 
 
 def constraints(weight: float = PER_RAD) -> Term:
-    """Return the term for the robot's clauses, such as its cable constraints (thesis eqs. 5.14-5.17), with tolerance 0.
+    """Return the term for the robot's clauses (conditions on motor positions, thesis eqs. 5.14-5.17), such as those of cables; tolerance 0.
 
     The residual is the sum of the amounts by which the clauses are violated [rad]. The cost is `weight` (2 per rad) times the residual.
     """

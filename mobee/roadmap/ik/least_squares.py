@@ -25,8 +25,9 @@ class Descent:
     """Damped least squares on the aims (residuals) of a problem, from many start poses.
 
     Args:
-        problem: its terms with derivatives are solved; the motors that may move are changed, within their limits.
-        besides: further aims with their tolerances, for example of task coordinates; their goals may differ for each start.
+        problem: the aims of its terms with derivatives are minimised; the motors that may move are changed, within their limits.
+        besides: additional aims with their tolerances, for example of task coordinates. The argument `goals` of the methods gives them
+            other goals for each start.
         threads: number of threads that share the starts; the results do not depend on it.
     """
 
@@ -47,23 +48,23 @@ class Descent:
 
     @cached_property
     def drawn(self) -> Flags:
-        """Whether each of the d motors that may move gets a random position in random start poses, (d,): it affects an aim or a term."""
+        """Whether each of the d motors that may move affects an aim or a term, (d,), so that random start poses should vary it."""
         return needed(self._problem, self._aims)
 
     def run(self, q: Array, goals: Array | None = None) -> Array:
-        """Search from the start poses q (B, n) rad; return only the K solutions that meet every aim, (K, n) rad.
+        """Search from the start poses q (B, n) rad; return only the K solutions whose residuals are all within the tolerances, (K, n) rad.
 
-        `goals`: for each start the further aims (`besides`), as numbers from `aim_reals`, (B, 26 * number of further aims); None: those of
-        the constructor.
+        `goals`: (B, 26 k), other goals for the k additional aims `besides` of the constructor: row i holds, for start i, the numbers that
+        `aim_reals` returns for aims of the same kinds, links and motors, in the same order. None: `besides` as given.
         """
         ends, met = self.met(q, goals)
         return ends[met]
 
     def met(self, q: Array, goals: Array | None = None) -> tuple[Array, Flags]:
-        """Return the solutions (B, n) rad found from the starts q (B, n) rad, and whether each solution meets every aim, (B,).
+        """Return the solutions (B, n) rad found from the starts q (B, n) rad, and whether each is within the tolerances of all aims, (B,).
 
-        `goals`: for each start the further aims (`besides`), as numbers from `aim_reals`, (B, 26 * number of further aims); None: those of
-        the constructor.
+        `goals`: (B, 26 k), other goals for the k additional aims `besides` of the constructor: row i holds, for start i, the numbers that
+        `aim_reals` returns for aims of the same kinds, links and motors, in the same order. None: `besides` as given.
         """
         ends, residuals = self.ends(q, goals)
         met: Flags = (residuals > self._enough).sum(axis=1) == 0
@@ -72,8 +73,9 @@ class Descent:
     def ends(self, q: Array, goals: Array | None = None) -> tuple[Array, Array]:
         """Return the solutions (B, n) rad found from the starts q (B, n) rad, and the residuals of all aims there, (B, aims), m or rad.
 
-        `goals`: for each start the further aims (`besides`), as numbers from `aim_reals`, (B, 26 * number of further aims); None: those of
-        the constructor. The number of evaluated poses is added to `problem.evaluations`.
+        `goals`: (B, 26 k), other goals for the k additional aims `besides` of the constructor: row i holds, for start i, the numbers that
+        `aim_reals` returns for aims of the same kinds, links and motors, in the same order. None: `besides` as given. The columns of the
+        residuals are the aims of the problem's terms, then `besides`. The number of evaluated poses is added to `problem.evaluations`.
         """
         from mobee._core.least_squares import descend  # loads the core, so it is imported only when needed
         from mobee.model.engine import robot_handle
@@ -126,9 +128,9 @@ def _drawn(problem: Problem, rng: np.random.Generator, count: int, which: Flags)
 
 
 def aim_reals(aims: Sequence[tuple[Aim, float | None]]) -> Array:
-    """Return the real numbers of aims and their tolerances in the form that the compiled core reads, (26 * number of aims,).
+    """Return the points, frames, lengths and tolerances of aims as the compiled core reads them, 26 numbers for each aim in turn.
 
-    Each pair is an aim and its tolerance; None: the term has no tolerance.
+    `aims`: pairs of an aim and its tolerance [m or rad]; None: no tolerance. The result has the shape (26 * number of aims,).
     """
     return np.concatenate([_reals(aim, tolerance) for aim, tolerance in aims]) if aims else np.empty(0)
 

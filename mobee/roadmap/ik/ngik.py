@@ -29,7 +29,8 @@ class IK:
     """The result of `solve_ik`.
 
     `q`: (n,) rad, the pose. `reached`: whether every term is within its tolerance, by a new evaluation of q. `residuals`: residual of each
-    term, by the term's name. `evaluations`: number of evaluated poses. `table`: all contacts of the pose, those of fields included.
+    term, by the term's name. `evaluations`: number of evaluated poses. `table`: all contacts of the pose, also those of fields (larger
+    shapes that cause repulsive forces).
     """
 
     q: Array
@@ -69,7 +70,7 @@ def solve_ik(
         evaluations: largest number of poses that the evolution strategy evaluates.
 
     Raises:
-        InvalidValue, UnknownName: an argument is not valid; the message says what is.
+        InvalidValue, UnknownName: an argument is not valid; the message states the valid values.
     """
     if method not in METHODS:
         raise UnknownName("method", method, METHODS)

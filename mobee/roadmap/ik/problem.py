@@ -58,8 +58,8 @@ def needed(problem: Problem, aims: Iterable[Aim]) -> Flags:
     """Return which of the d motors that may move need a random position in the starts of the pose search, (d,).
 
     A motor needs one if it moves a link of one of the `aims` (residuals for least squares), or is the motor of an aim. It also needs one if
-    it changes a term that has a tolerance but, without a derivative, no aims; this is tested in PROBES (3) random poses. The term
-    "collision" is left out: if the fingers, for example, began at random positions, they would only cause more contacts.
+    it changes a term that has a tolerance but no derivative; this is tested in PROBES (3) random poses. The term "collision" is left out:
+    if the fingers, for example, began at random positions, they would only cause more contacts.
     """
     moves = _movers(problem.model.robot, aims)[problem.free]
     others = [one for one in problem.terms if one.aims is None and one.tolerance is not None and one.name != "collision"]

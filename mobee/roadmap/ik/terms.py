@@ -136,8 +136,8 @@ Plain = Callable[..., ArrayLike]
 class Function:
     """Calls a user's function with a batch of poses and the table of their contacts, or for each pose with a tuple of its contacts.
 
-    The first call tests whether the function accepts a batch: then it must return the same values as for single poses. `contacts`: False if
-    the function takes only the pose.
+    The first call tests whether the function accepts a batch, that is, returns the same values for it as for the single poses. `contacts`:
+    False if the function takes only the pose.
     """
 
     def __init__(self, function: Plain, contacts: bool = True) -> None:

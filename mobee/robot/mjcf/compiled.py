@@ -52,8 +52,9 @@ class Compiled:
     these elements in the world's frame; `inertial`: at the centres of mass. `anchors` (m), `axes`: (joints, 3), a point on the axis and the
     unit axis of each joint, in the world's frame. `names[kind]`: the names of the elements of a kind ("body", "joint", "geom", "site",
     "key" and so on); an element without a name gets one from its kind and number. `lines[kind]`: the lines of these elements in the file; 0
-    if MuJoCo does not record the line. The remaining attributes have the kind of each joint, geom, equality and so on as text, for example
-    "hinge".
+    if MuJoCo does not record the line. `joint_kinds`, `geom_kinds`, `equality_kinds`, `camera_modes`: MuJoCo's type of each such element as
+    text, for example "hinge". `transmissions`: what each actuator acts on, for example "joint". `wraps`: type of each element of all
+    tendons.
     """
 
     path: Path

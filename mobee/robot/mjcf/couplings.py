@@ -17,10 +17,10 @@ Line = tuple[int, int, float, float]  # joint one = scale * joint other + offset
 def drives_of(compiled: Compiled) -> dict[int, Drive]:
     """Return a dict from MuJoCo's number of each hinge and slide that moves to its drive (motor, scale and offset).
 
-    A joint equality couples its two joints. An actuator of a fixed tendon moves the joints of the tendon together, in proportion to
-    their coefficients, unless one of these joints has an actuator. A group of coupled joints has one motor, which is named after the joint
-    of the group that has an actuator, else after the joint that depends on no other. Joints that an equality holds at a constant position
-    have no drive.
+    A joint equality couples its two joints. An actuator of a fixed tendon moves the joints of the tendon together, in proportion to their
+    coefficients, unless one of these joints has its own actuator. A group of coupled joints has one motor. Its name is that of the joint in
+    the group that has an actuator; if none has one, that of the joint that does not depend on another. Joints that an equality holds at a
+    constant position have no drive.
     """
     held = set(held_joints(compiled))
     moving = [j for j, kind in enumerate(compiled.joint_kinds) if kind in ("hinge", "slide") and j not in held]

@@ -50,8 +50,8 @@ def read_motor(compiled: Compiled, group: list[tuple[int, int, Drive]], home: Ar
     """Return the motor that drives a group of coupled joints.
 
     `group`: for each joint (index in the robot, MuJoCo's number, drive), the joint with the name of the motor first. `home`: MuJoCo's
-    position vector qpos at home. `meant`: whether home is from a keyframe, so that it is kept even in a limit zone of the control law;
-    otherwise the motor's home is the nearest position outside the zones.
+    position vector qpos at home. `meant`: True: home is from a keyframe and is kept, even in a limit zone, a range near a limit in which
+    the control law pushes inward. False: the motor's home is the nearest position outside the zones.
     """
     _, master, _ = group[0]
     limits = joint_limits(compiled, master)

@@ -27,9 +27,9 @@ NEAR = 1e-8  # of the mesh's size between corners that are one
 def convex_hull(points: Array, corners: Corners = CORNERS) -> Array:
     """Return the vertices (v, 3), v >= 4, of a convex body that contains all `points` (n, 3) m and has at most `corners` corners.
 
-    It is the exact hull if the hull has at most `corners` corners, or if `corners` is "all". Otherwise it is bounded by some of the planes
-    of the hull's facets: planes are added where corners protrude most, until one more plane would give more than `corners` corners. Flat
-    meshes get a thickness of at least 0.2 mm. Raises InvalidValue for points that have no hull.
+    It is the exact hull if the hull has at most `corners` corners, or if `corners` is "all". Otherwise it is a larger body: the box around
+    the hull, cut by planes of the hull's facets, one after the other where the body protrudes most, until one more plane would give more
+    than `corners` corners. Flat meshes get a thickness of at least 0.2 mm. Raises InvalidValue for points that have no hull.
     """
     from scipy.spatial import ConvexHull, QhullError  # 0.3 s, and only robots with meshes need it
 

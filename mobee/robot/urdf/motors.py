@@ -133,11 +133,11 @@ def _warn_of_free(joint: UrdfJoint) -> None:
 
 
 def read_motor(master: UrdfJoint, driven: Sequence[tuple[int, UrdfJoint, Drive]], part: str = "all") -> Motor:
-    """Return the motor of the joint `master` and of all joints that mimic it; its limits keep each of these joints within its own limits.
+    """Return the motor of the joint `master` and of all joints that mimic it; its limits keep every joint within the joint's limits.
 
     `driven`: for each of these joints, `master` included, (index in the robot, joint, drive). `part`: name of the motor's part. The unit is
-    that of `master`: rad, or m if it is prismatic. Home is 0, or the position nearest to 0 outside the limit zones of the control law.
-    Warns of limits that are assumed or ignored.
+    that of `master`: rad, or m if it is prismatic. Home is 0, or the position nearest to 0 outside the limit zones, ranges near the limits
+    in which the control law pushes inward. Warns of limits that are assumed or ignored.
     """
     limits = joint_limits(master)
     _warn_of_free(master)

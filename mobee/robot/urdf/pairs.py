@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which shapes of a robot from a URDF are tested against each other, solids and generated fields.
+"""The pairs of shapes (solids, and the fields generated around them) of a robot from a URDF that are tested for contacts.
 
 Two shapes on different links are tested, except
 - shapes of adjacent links, unless the SRDF enables them: a joint lies between the two, or several joints at one place (5 cm) with

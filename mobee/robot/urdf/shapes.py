@@ -28,7 +28,10 @@ CLOSE = 1e-9  # m, for the ends of a cylinder that carries two spheres as caps
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Found:
-    """A shape that was read from a file: `node`, its XML element with file and line; `base`: whether it belongs to the robot's base."""
+    """A shape that was read from a file.
+
+    `node`: its XML element with file and line. `base`: whether it belongs to the robot's base, which is never tested against world objects.
+    """
 
     node: Node
     shape: Shape

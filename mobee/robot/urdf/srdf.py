@@ -27,9 +27,10 @@ FREE_BASE = "root_joint"  # Pinocchio's name for the joint that lets a base move
 class Srdf:
     """The content of an SRDF file; links and joints have the names of the URDF.
 
-    `disabled`: pairs of links -> reason, file and line. `enabled`: pairs of links. `groups`: name -> its element and its joints, in the
-    order of the file. `states`: name of a <group_state> -> its joints (`State`); the states of several groups with one name are merged.
-    `path`: path of the file; None: the robot has no SRDF.
+    `disabled`: pairs of links that are not tested for contacts -> reason, file and line. `enabled`: pairs of links that are tested even if
+    they are adjacent. `groups`: name -> its element and its joints, in the order of the file. `states`: name of a <group_state> -> the
+    positions of its joints (`State`); the states of several groups with one name are merged. `path`: path of the file; None: the robot has
+    no SRDF.
     """
 
     disabled: dict[NamePair, str] = field(default_factory=dict)
@@ -42,7 +43,7 @@ class Srdf:
 def find_srdf(urdf: Path, robot: str) -> Path | None:
     """Return the path of the SRDF of a URDF: it has the name of the URDF file, or else that of the robot, and the ending .srdf.
 
-    It is searched in the folder of the URDF and in ../srdf; upper and lower case are equal. Returns None if there is no such file.
+    It is searched in the folder of the URDF and in ../srdf; upper and lower case do not matter. Returns None if there is no such file.
     """
     folders = (urdf.resolve().parent, urdf.resolve().parent.parent / "srdf")
     for name in dict.fromkeys((urdf.stem.lower(), robot.lower())):
@@ -218,7 +219,7 @@ def choose_home(states: Mapping[str, State], asked: str | None, srdf: Path | Non
 
     `states`: the poses in the SRDF, by name. `asked`: name of the requested pose, or "zero"; None: the pose with the first of the names
     HOMES ("home", "ready", ...) that the SRDF has, else its only pose, else "zero", a home without positions. `srdf`: path for the message.
-    Upper and lower case are equal. Raises UnknownName with the valid names.
+    In names, upper and lower case do not matter. Raises UnknownName with the valid names.
     """
     lower = {name.lower(): name for name in states}
     if asked is not None:

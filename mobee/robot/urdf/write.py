@@ -35,7 +35,8 @@ class GeometryWriter:
     def solid(self, link: ET.Element, shape: Shape, point: Array, note: dict[str, str]) -> None:
         """Add a solid to the element `link`; a capsule is written as a cylinder and two spheres.
 
-        `point`: (3,) m, origin of the link's frame in the root frame. `note`: attributes of an element <mobee>; empty: no such element.
+        `point`: (3,) m, origin of the link's frame in the root frame. `note`: attributes for which URDF has no place (part, base); they are
+        written in an element <mobee>, if there are any.
         """
         for name, part in _parts(shape):
             geometry = self._geometry(part)
@@ -49,7 +50,8 @@ class GeometryWriter:
     def field(self, link: ET.Element, shape: Shape, point: Array, note: dict[str, str]) -> None:
         """Add a field to the element `link`, as an element <mobee>, because URDF has no element for fields.
 
-        `point`: (3,) m, origin of the link's frame in the root frame. `note`: further attributes of the element.
+        A field is a volume that causes a repulsive force. `point`: (3,) m, origin of the link's frame in the root frame. `note`: further
+        attributes of the element <mobee> (part, base).
         """
         element = ET.SubElement(link, "mobee", {"field": shape.name} | note)
         _origin(element, shape, point)
@@ -109,10 +111,10 @@ Master = tuple[int, float, float]  # joint, scale, offset
 def write_urdf(robot: Robot, path: str | Path) -> Path:
     """Write a robot to a URDF file x.urdf and return its path; beside it, write x.srdf and, for convex shapes, the folder x_meshes.
 
-    Every link's frame is at its joint, with the orientation of the root frame at zero pose. One joint represents each motor: the first
-    that moves as the motor does, else its first joint; the motor's other joints mimic it. Markers are links on fixed joints. `load_robot`
-    reads the file as the same robot, but without the clauses, and with an enclosing hull of at most 64 corners for each convex shape
-    with more. Raises InvalidValue for a joint that no motor or several drive.
+    Every link's frame is at its joint, with the orientation of the root frame at zero pose. One joint represents each motor: the first one
+    whose position equals the motor's, else the motor's first joint; the motor's other joints mimic it. Markers are links on fixed joints.
+    `load_robot` reads the file as the same robot, but without the clauses, and with an enclosing hull of at most 64 corners for each convex
+    shape with more. Raises InvalidValue for a joint that no motor or several drive.
     """
     path = Path(path)
     drives_of(robot)  # raises for a joint without a master

@@ -20,10 +20,10 @@ class Draft:
 
     `subtree`: for each link, the index of the element above it that has the attribute noSelfCollision, -1: none. `drives`: for each joint,
     its XML element and the name of its motor. `parts`: name -> its XML elements. `hands`: dict from the index of an element with
-    noSelfCollision to its name, for the reasons of untested pairs. `hosts`: for each shape, its element. `shape_names`: dict from the name
-    of a shape to the number of further shapes to whose names a number was appended because of it. `hides`: camera -> its XML element, and
-    the names of the links that it does not show. `constraints`: part and XML element of each constraint list. `ignores`: <ignore> elements.
-    `others`: included robots, with the XML elements that include them. `where`: (kind, name) -> "file:line".
+    noSelfCollision to its name, for the reasons of untested pairs. `elements`: the root, and all <link> and <joint> elements. `hosts`: for
+    each shape, the index of its element. `shape_names`: name of a shape -> the next number that makes another name from it. `hides`: camera
+    -> its XML element, and the names of the links that it does not show. `constraints`: part and XML element of each constraint list.
+    `ignores`: <ignore> elements. `others`: included robots, with the XML elements that include them. `where`: (kind, name) -> "file:line".
     """
 
     links: list[str] = field(default_factory=lambda: ["base"])

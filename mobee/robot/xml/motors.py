@@ -41,7 +41,7 @@ class MotorDraft:
 def read_motor(node: Node, part: str, count: int) -> MotorDraft:
     """Return the motor that a <motor> element describes; raises RobotFileError if it is not valid.
 
-    `part`: name of its part. `count`: number of motors before it.
+    `part`: name of its part. `count`: number of motors before it in the file, its index if the element has no idx.
     """
     low, high = node.number("minPos"), node.number("maxPos")
     unit = node.choice("unit", node.optional("unit") or UNITS[0], UNITS, "unit")

@@ -107,7 +107,7 @@ def ignore_elements(robot: Robot) -> list[ET.Element]:
 
 
 def role_elements(robot: Robot, role: str, pairs: Ints, own: bool) -> list[ET.Element]:
-    """Return the <ignore> elements that exclude pairs of shapes of one role from tests, except the pairs of links in `robot.untested`.
+    """Return the <ignore> elements for the pairs of shapes of one role that are not tested, except those that `robot.untested` covers.
 
     `role`: "solid", or "field", a volume that causes a repulsive force. `pairs`: (p, 2) indices of shapes, the pairs that are tested.
     `own`: whether the reader of the file also tests fields of one part with each other, so that these need <ignore> elements too.

@@ -26,7 +26,7 @@ FORMAT = "mobee calibration 1"
 
 @dataclass(frozen=True, slots=True)
 class Quality:
-    """Distances of the observed tag from the position that a calibration's parameters predict: the median and the 95 % quantile.
+    """Distances of the observed tag on the palm from the position that a calibration's parameters predict: median and 95 % quantile.
 
     `pixels_*`: distances of corners in the pictures [px]. `metres_*`: distances of the middle of the tag in space [m].
     """
@@ -66,8 +66,8 @@ class Calibration:
         tag: the tag on the palm.
         pictures: number of observations that were used.
         names: names of the P parameters.
-        x: (P,) the parameters, m, rad and s.
-        covariance: (P, P) of the parameters.
+        x: (P,) the parameters in the order of `names`; m, rad and s.
+        covariance: (P, P) of x.
         prior: (P,) standard deviations of the parameters before the calibration.
         misfit: mean squared residual, in standard deviations; 1 if noise and model are as assumed.
         uncalibrated: errors of the predicted tag with all parameters 0.

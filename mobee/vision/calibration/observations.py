@@ -14,10 +14,10 @@ from mobee.vision.encoders import Moment
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Observation:
-    """The tag in the pictures of all cameras with the same stamp.
+    """The tag on the robot's palm in the pictures of all cameras with the same stamp (time of the picture).
 
-    `moment`: the encoders at the stamp. `corners`: (4, 2) px, column and row, by name of the camera; a camera that does not see the tag is
-    missing.
+    `moment`: the encoders at the stamp. `corners`: by name of the camera, the corners (4, 2) px of the tag, column and row, in the order of
+    `Tag.corners`; a camera that does not see the tag is missing.
     """
 
     moment: Moment

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A simulated robot that watches its own hand: it moves through postures on the offline plant, and its cameras make pictures of it."""
+"""A simulated robot that watches its own hand: it moves through postures on the offline plant, and its cameras take pictures."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ LONGEST = 6.0  # s for one motion
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """A recorded motion of a simulated robot.
+    """A recorded motion of a simulated robot, with one row for each tick.
 
-    `encoders`: (m, n) rad at `times` (m,) s. `q`: (m, n) rad, the true positions one tick later. `dt`: duration of a tick [s].
+    `encoders`: (m, n) rad at `times` (m,) s. `q`: (m, n) rad, true positions; row k is at times[k] + dt. `dt`: duration of a tick [s].
     """
 
     times: Array
@@ -100,8 +100,8 @@ def moved_parts(rig: Rig, part: str) -> tuple[str, ...]:
 def watch_hand(watcher: Watcher, postures: Array, part: str, progress: Callable[[float], None] = lambda share: None) -> list[Observation]:
     """Move the head and the arm `part` through postures (K, n) rad; return the observations of the tag from the cameras.
 
-    `progress`: called with the share of postures that are done. The encoders of the head are wrong by offsets. In the simulation they are
-    right, and the head that carries the cameras is rotated by the offsets instead, so that the pictures are the same.
+    `progress`: called with the share of postures that are done. Offsets of the head's encoders are simulated by the pictures: the encoders
+    are right, and the head, which carries the cameras, is drawn rotated by the offsets.
     """
     rest, found = RESTING * PERIOD + 0.1, []
     for number, posture in enumerate(postures):

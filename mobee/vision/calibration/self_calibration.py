@@ -138,12 +138,12 @@ class JointOffsets:
 
 
 class SelfCalibratingPlant:
-    """A ReachPlant that corrects the encoders of another plant by positions at which the robot's hand is seen.
+    """A plant for agents that corrects the encoder values of another plant, from positions at which the robot's hand is seen.
 
-    With it, a state of an agent stays the same true posture when the encoders become wrong. After each action that leaves the robot at
-    rest, `see` is called once, also while an agent is evaluated. Targets and results of actions are in corrected values. For a reach, the
-    target is shifted such that the plant, which uses uncorrected values, brings the true marker to the wanted position. Forces of contacts
-    and limits are computed from uncorrected values.
+    So each state of an agent still stands for the same true posture when the encoders become wrong. After each action that leaves the robot
+    at rest, `see` is called once, also while an agent is evaluated. Targets and results of actions are in corrected values. For a reach,
+    the target is shifted such that the plant, which uses uncorrected values, brings the true marker to the wanted position. Forces of
+    contacts and limits are computed from uncorrected values.
 
     Args:
         plant: the plant, offline or live, whose encoders may be wrong.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Detects things by their colour: regions of the thing's hue, and their outlines to a fraction of a pixel."""
+"""Detects things (objects of known shape, size and colour) by their colour: finds their regions, with outlines to a fraction of a pixel."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Detections: the regions of one picture that look like a thing."""
+"""Detections: the regions of one picture that may show a thing, an object of known shape, size and colour."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from mobee.vision.objects.thing import Thing
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Detection:
-    """A region of one picture that looks like a thing.
+    """A region of one picture that may show a thing, an object of known shape, size and colour (`Thing`).
 
-    `name`: name of the thing. `outline`: (m, 2) px, column and row, points on its outline, without those at the picture's border. `area`:
-    px. `confidence`: 0 to 1.
+    `name`: name of the thing. `outline`: (m, 2) px, column and row of points on the region's outline, without points at the picture's
+    border. `area`: in pixels. `confidence`: 0 to 1.
     """
 
     name: str

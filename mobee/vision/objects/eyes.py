@@ -31,11 +31,13 @@ class Eye:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Eyes:
-    """The E cameras of a robot at one stamp, in the order of their names.
+    """The E cameras of a robot at one stamp (time of a picture), with the uncertainty of their poses.
 
-    Uncertainty is given as a factor F (6 E, r); F F' is the covariance of the displacements [m] and rotations [rad] of all cameras, about
-    their optical centres, in the root frame. `noise`: F of errors that are new in each picture (encoders and stamp). `bias`: F of errors
-    that stay the same while the gaze does not change (calibration).
+    `names`: the cameras; `eyes` and the rows below have the same order. The uncertainty is a factor F (6 E, r): F F' is the covariance of
+    the pose errors of all cameras together. F has six rows for each camera: the displacement of its optical centre along x, y and z of the
+    root frame [m], then its rotation about the directions x, y and z of the root frame, through the optical centre [rad]. `noise`: F of
+    errors that are new in each picture (encoders and stamp). `bias`: F of errors that stay the same while the gaze does not change
+    (calibration).
     """
 
     names: tuple[str, ...]

@@ -17,10 +17,10 @@ SOLID = 0.6  # share of its convex hull that a region must fill: the things are 
 
 
 def outlined(name: str, likeness: NDArray[np.float32]) -> list[Detection]:
-    """Return the regions of a picture that look like the thing `name`, as detections.
+    """Return the regions of a picture that show the thing `name`, as detections.
 
-    `likeness`: (H, W), proportional to the share of each pixel that shows the thing; 0: none. The largest value near a pixel, but at least
-    1, is taken as the value of a pixel that shows only the thing. The shares themselves, 0 to 1, are valid values too. Small regions, and
+    `likeness`: (H, W), proportional to the share of each pixel that shows the thing; 0: none. To get the share, each value is divided by
+    the largest value near the pixel, or by 1 if this is larger. So the values may also be the shares themselves, 0 to 1. Small regions, and
     regions that are far from convex, are left out.
     """
     height, width = likeness.shape

@@ -43,12 +43,12 @@ class Placed:
         name: name of the thing.
         position: (3,) m.
         rotation: (3, 3), of the shape's axes.
-        size: (g,) m, the lengths of its kind of shape.
+        size: (g,) m, the lengths of its shape, in the order of `Thing.size`.
         noise: (3, 3) m^2, covariance of the position from errors that are new in each picture.
         bias: (3, 3) m^2, covariance of the position from errors that stay the same while the gaze does not change.
         size_deviation: (g,) m, standard deviations of the size.
-        misfit: rms distance of the outlines' points from the silhouettes, px.
-        share: share of these points that fit, 0 to 1.
+        misfit: px, rms distance of those points of the outlines that fit from the predicted edge of the shape (silhouette).
+        share: share of all points of the outlines that fit, 0 to 1.
     """
 
     name: str

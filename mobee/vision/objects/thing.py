@@ -16,7 +16,7 @@ TOLERANCE = 0.1  # relative standard deviation of a size from the usual one
 
 @dataclass(frozen=True, slots=True)
 class Thing:
-    """A thing that may be seen; several objects may look like it.
+    """A kind of object that vision can recognise by shape, size and colour; a world may have several objects of the kind.
 
     `kind`: "sphere", "cylinder" or "box". `size` in m: sphere (radius,); cylinder (radius, height); box (x, y, z), full edges. Cylinders
     and boxes stand upright. `color`: red, green, blue, 0 to 1. `tolerance`: relative standard deviation of each length from `size`; 0: the
@@ -31,7 +31,7 @@ class Thing:
 
 
 def things_in(world: World) -> list[Thing]:
-    """Return the things that the targets of a world look like: spheres, cylinders and boxes that have a colour; positions are ignored."""
+    """Return a thing for each target of a world that is a sphere, cylinder or box and has a colour; positions are ignored."""
     kinds: dict[str, Kind] = {kind: kind for kind in KINDS}
     return [
         Thing(item.name, kinds[item.kind], item.size, item.color[:3])

@@ -18,7 +18,7 @@ IMPOSSIBLE = 1e6  # cost of a place outside a track's gate
 
 
 class Tracker:
-    """The tracks of all objects that look like given things, in the root frame at the time of the pictures.
+    """The tracks of all seen objects of the given things (kinds of objects), in the root frame at the time of the pictures.
 
     The first object of a thing has the thing's name, further ones are `name_2`, `name_3`. An object that was hidden or moved elsewhere
     keeps its name: if no other name is left, a new track takes the name of an object that is not seen any more.

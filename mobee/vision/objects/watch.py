@@ -19,10 +19,12 @@ TURN = 0.02  # rad by which a motor moves while equal pictures come: no camera s
 
 
 class PictureWatch:
-    """Checks the pictures of one camera for signs that they do not show the present scene."""
+    """Checks the pictures of one camera for signs that they do not show the present scene.
+
+    `latest`: largest age of a picture at its arrival, s.
+    """
 
     def __init__(self, latest: float) -> None:
-        """Make a watch; `latest`: largest age of a picture at its arrival, s."""
         self._latest = latest
         self._stamp = -np.inf
         self._digest, self._same = b"", 0

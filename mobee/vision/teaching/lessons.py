@@ -21,8 +21,9 @@ class Lesson:
 
     The teacher is a robot that carries the ball; the learner is a robot that learns to locate it.
 
-    `pixels`: (2, 2) px, column and row of the ball in the left and in the right picture. `moment`: the encoders at the stamp. `reported`,
-    `true`: (3,) m, root frame, position of the ball as the teacher reports it, and as it is. `pose`: index of the teacher's pose.
+    `pixels`: (2, 2) px, column and row of the ball in the left picture, then in the right one. `moment`: the encoders at the stamp.
+    `reported`: (3,) m, root frame, position of the ball that the teacher reports. `true`: its true position. `pose`: index of the teacher's
+    pose.
     """
 
     pixels: Array
@@ -36,9 +37,9 @@ class Lesson:
 class Lessons:
     """N lessons (`Lesson`) as arrays.
 
-    `inputs`: (N, d), columns and rows of the ball in the left and right picture [px], then encoders [rad]. `reported`, `true`: (N, 3) m,
-    root frame, position of the ball as the teacher, the robot that carries it, reports it, and as it is. `poses`: (N,), index of the
-    teacher's pose.
+    `inputs`: (N, d), column and row of the ball in the left picture, then in the right one [px], then the encoders of torso and head [rad].
+    `reported`: (N, 3) m, root frame, positions of the ball that the teacher, the robot that carries it, reports. `true`: its true
+    positions. `poses`: (N,), index of the teacher's pose.
     """
 
     inputs: Array
@@ -48,7 +49,7 @@ class Lessons:
 
     @classmethod
     def of(cls, robot: Robot, lessons: list[Lesson]) -> Lessons:
-        """Convert a list of lessons to arrays; the encoders in the inputs are those of the torso and the head."""
+        """Convert a list of lessons to arrays."""
         seeing = seeing_motors(robot)
         rows = [np.concatenate([one.pixels.ravel(), one.moment.q[seeing]]) for one in lessons]
         reported, true = (np.array([getattr(one, name) for one in lessons]) for name in ("reported", "true"))

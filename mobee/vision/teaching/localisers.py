@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Localisers, which learn the position of a thing from its pixels in two pictures and the encoders (thesis 4.1.2; Leitner et al. 2012).
 
-The inputs (N, 13) are those of `mobee.vision.teaching.lessons`: columns and rows of the thing in the left and right picture [px], then the
-encoders of torso and head [rad], the last three of which are the eyes' tilt, version and vergence, as on the iCub.
+The inputs (N, 13) are those of `mobee.vision.teaching.lessons`: column and row of the thing in the left picture, then in the right one
+[px], then the encoders of torso and head [rad], the last three of which are the eyes' tilt, version and vergence, as on the iCub.
 """
 
 from __future__ import annotations
@@ -34,9 +34,10 @@ NEAREST = 0.08  # rad: the smallest angle between the rays of both eyes, of a th
 
 
 class Localiser(Protocol):
-    """The interface of a localiser, which learns positions of a thing from pixels and encoders.
+    """The interface of a localiser, which learns positions of a thing (a visible object) from pixels and encoders.
 
-    An input has 13 numbers: column and row of the thing in the left and right picture [px], then the encoders of torso and head [rad].
+    An input has 13 numbers: column and row of the thing in the left picture, then in the right one [px], then the encoders of torso and
+    head [rad].
     """
 
     def fit(self, inputs: Array, places: Array) -> None:
@@ -154,8 +155,8 @@ class CorrectedStereo:
 def stereo_places(rig: Rig, x: Array, inputs: Array) -> Array:
     """Return the positions (N, 3) m, root frame, that are nearest to the rays of both cameras; NaN where the rays are parallel.
 
-    `x`: (P,) parameters of cameras and encoders, in the order of `Rig.names`. `inputs`: (N, 13), columns and rows of the thing in the left
-    and right picture [px], then the encoders of torso and head [rad].
+    `x`: (P,) parameters of cameras and encoders, in the order of `Rig.names`. `inputs`: (N, 13), column and row of the thing in the left
+    picture, then in the right one [px], then the encoders of torso and head [rad].
     """
     q = np.repeat(rig.robot.home[None], len(inputs), axis=0)
     q[:, seeing_motors(rig.robot)] = inputs[:, 4:]

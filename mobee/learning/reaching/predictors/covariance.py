@@ -59,13 +59,16 @@ def default_parameters(reaches: Reaches) -> Array:
     """Return the logarithms of the covariance parameters before the first fit, shape (8 + d,).
 
     First come the parameters in `DEFAULTS` (variances of rewards, and lengths in m), then one length for each joint, in units of the spread
-    of its samples.
+    of its samples (largest minus smallest).
     """
     return np.log([*DEFAULTS.values(), *[DEFAULT_JOINT] * reaches.samples.shape[1]])
 
 
 def joint_squares(reaches: Reaches) -> Array:
-    """Return for each joint the squared differences between all states' samples, in units of their spread, shape (d, S, S)."""
+    """Return for each joint the squared differences between the samples of all pairs of states, shape (d, S, S).
+
+    They are in units of the spread of the joint's samples (largest minus smallest).
+    """
     scaled = (reaches.samples / np.maximum(np.ptp(reaches.samples, axis=0), 1e-9)).T
     squares: Array = (scaled[:, :, None] - scaled[:, None, :]) ** 2
     return squares
@@ -108,10 +111,10 @@ class Covariance:
         return total
 
     def with_slopes(self, a: Points, count: Array) -> tuple[Array, Slopes]:
-        """Return the covariance (n, n) of the average rewards of n reaches, and a function that sums its derivatives.
+        """Return the covariance (n, n) of the average rewards of n reaches, and a function that computes its derivatives.
 
-        `a`: the reaches. `count`: (n,) number of tries over which the reward of each reach is averaged. The function takes weights (n, n)
-        and returns the derivatives, with respect to the logarithms of the parameters, of the sum of weights times covariance, (8 + d,).
+        `a`: the reaches. `count`: (n,) number of tries over which the reward of each reach is averaged. The function takes weights (n, n).
+        It returns the derivatives (8 + d,) of the sum of weights times covariance with respect to the logarithms of the parameters.
         """
         value, pair = self._value, np.ix_(a.state, a.state)
         place_far = _squared(a.target, a.target) / value[_PLACE_L] ** 2
@@ -163,7 +166,8 @@ def negative_log_posterior(logs: Array, arm: LinearArm, squares: Array, reached:
     """Return the negative log posterior of the covariance parameters, up to a constant, and its derivatives (8 + d,).
 
     It is the negative logarithm of the evidence (marginal likelihood) of the rewards times the prior of the parameters. The average reward
-    of each pair and the scatter around it are used, which is equivalent to using every reward.
+    of each pair of state and target and the scatter around it are used, which is equivalent to using every reward. If there are more than
+    500 pairs, the averages of only 500 are used.
 
     Args:
         logs: (8 + d,) logarithms of the parameters.

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Gaussian process regression of rewards over poses and targets: the best predictor of this package.
 
-The triangular factor of the covariance gets one more row for each reach. For every queried target, the rows of its states are cached. At
-the next query they are continued in whole blocks, so that predictions depend only on the reaches and not on earlier queries.
+The Cholesky factor of the covariance gets one more row for each reach. The intermediate results of every target for which predictions were
+asked are cached. They are always computed in the same blocks of rows, so that predictions depend only on the reaches and not on earlier
+queries.
 """
 
 from __future__ import annotations
@@ -25,9 +26,11 @@ MAX_CACHE = 300e6  # bytes of rows and covariances of queried targets, of one ta
 class Query:
     """The cache of one target for which predictions were asked: intermediate results of Gaussian process regression, and the prediction.
 
-    `rows` (n, S) has a row for each of the n reaches so far, and a column for each state: the triangular factor's inverse times the
-    covariance of reaches and states. The first `done` rows are final, and `sure` is the prediction from them. The first `upto` rows are
-    computed, and `mean` (S,), minus the prior mean, and `covariance` (S, S) are the prediction from all of them.
+    `at`: the features of the reaches from all S states for this target. `prior`: (S, S), the covariance of their rewards before any reach.
+    `rows`: as argument the number of rows to reserve; as attribute (n, S), with a row for each of the n reaches so far and a column for
+    each state: the inverse of the Cholesky factor times the covariance of reaches and states. The first `done` rows are final, and `sure`
+    is the prediction (mean and covariance) from them. The first `upto` rows are computed; the prediction from all of these is `mean` (S,),
+    as a difference from the prior mean, and `covariance` (S, S).
     """
 
     def __init__(self, at: Points, prior: Array, rows: int) -> None:
@@ -71,7 +74,10 @@ class Posterior:
         return self._used
 
     def about(self, target: Array) -> tuple[Array, Array]:
-        """Return the mean (S,), minus the prior mean, and the covariance (S, S) of the mean rewards of all states for a target (3,) m."""
+        """Return the mean (S,) and the covariance (S, S) of the mean rewards of all states for a target (3,) m, root frame.
+
+        The prior mean is subtracted from the mean.
+        """
         known = self._updated(target)
         return known.mean, known.covariance
 

@@ -19,7 +19,7 @@ PRIOR_WEIGHT = 1.0  # of slope 1 in the fit of the linear function, in reaches
 
 
 class LinearArm:
-    """Predicts rewards by a linear arm with springs: reward = offset + slope * the reward of the distance that this arm leaves.
+    """Predicts rewards by a linear arm with springs: reward = offset + slope * the reward of the distance that remains with this arm.
 
     Args:
         reaches: the reach actions: the marker's position and Jacobian in each state. Without Jacobians the arm does not move, and the whole

@@ -15,9 +15,10 @@ NOISE = 0.05  # standard deviation of a reward around its mean, before there are
 
 
 class Table(Independent):
-    """Predicts the average reward of each pair of state and target; if a pair has few rewards, the average of all has more weight.
+    """Predicts for each pair of state and target a weighted mean of the rewards of the pair and the average of all pairs.
 
-    The model: mean rewards are normally distributed around the average of all, and the rewards of a pair around their mean.
+    The fewer rewards a pair has, the more the average of all pairs counts. The model: the mean rewards of pairs are normally distributed
+    around the average of all pairs, and the rewards of a pair around its mean reward.
 
     Args:
         reaches: the reach actions, one for each state.

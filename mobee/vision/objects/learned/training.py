@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Trains the network of a learned detector on rendered pictures.
 
-The network learns the share of each thing in a pixel by least squares; the minimum is the mean share for the same surroundings of a pixel.
-Pixels are drawn from the edges and the inside of things and from the rest of the picture. The network first learns from half of the
-pictures. Then it learns from all of them, and also from pixels at which it was wrong.
+From the surroundings of a pixel the network learns, by least squares, the share of the pixel that each thing covers. So its output is the
+mean share over pixels with such surroundings. Pixels are drawn from the edges and the inside of things and from the rest of the picture.
+The network first learns from half of the pictures. Then it learns from all of them, and also from pixels at which it was wrong.
 """
 
 from __future__ import annotations
