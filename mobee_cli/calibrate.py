@@ -79,10 +79,10 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def rig_of(robot: Robot, marker: str, settings: CameraSettings) -> Rig:
-    """Return the robot with its first two cameras and a tag on a marker, as calibration needs them.
+    """Return the robot with its first two cameras and a visual tag fixed at `marker`, as calibration needs them.
 
-    `settings`: settings of the cameras, of which the lens is used. Raises MobeeError if the robot has fewer than two cameras or no such
-    marker.
+    `marker`: name of a marker (named point of a link). `settings`: settings of the cameras, of which the lens is used. Raises MobeeError if
+    the robot has fewer than two cameras or no such marker.
     """
     cameras = cameras_of(robot)
     require_cameras(robot, cameras, STEREO)

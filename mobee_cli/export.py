@@ -141,7 +141,7 @@ def written_whole(file: Path) -> Iterator[Path]:
 
 
 def write_reaches(file: Path, folder: Path) -> int:
-    """Write all reaches from which agents have learned as CSV, one line for each step, and return the number of lines.
+    """Write a CSV file of all reaches from which agents have learned, with one line for each step; return the number of lines.
 
     Raises MobeeError if the run has no such reaches.
     """

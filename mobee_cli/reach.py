@@ -121,8 +121,9 @@ class Setup:
     """The plant on which a hand reaches, offline or live.
 
     `hand`: the marker and the part that reach. `q`: measures the positions of all motors, (n,) rad. `present_object(name, aim, faces)`:
-    makes an object of the plant's world the target and returns the target. `first_motion`: returns the time from the last request to the
-    first command that moves the robot [s]; None offline.
+    makes an object of the plant's world the target and returns the target; `aim`: reach its "centre" or "surface"; `faces`: whether the
+    marker's normal must point at it. `first_motion`: returns the time from the last request to the first command that moves the robot [s];
+    None offline.
     """
 
     robot: Robot

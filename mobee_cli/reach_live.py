@@ -75,7 +75,7 @@ class LivePlant(BusPlant):
                 raise UserError(f"{error}. `mobee launch reach` starts a system in which no agent owns it.", FAILED) from None
 
     def act(self, part: str, target: Array) -> Outcome:
-        """Set the part's attractor to `target` (n_part,) rad, wait until the part settles or times out, and return the outcome.
+        """Set the part's attractor (goal of its motors) to `target` (n_part,) rad; return the outcome when it has settled or timed out.
 
         Raises UserError if this takes longer than REACH_TIMEOUT (300 s).
         """
@@ -83,7 +83,7 @@ class LivePlant(BusPlant):
             return super().act(part, target)
 
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
-        """Pull a marker to the presented target by a force, and return the outcome.
+        """Pull a marker by a force to the target that was presented last, and return the outcome.
 
         Afterwards the attractor pulls the part back, or, with `stay`, the part stays where the force ended. Raises UserError if this takes
         longer than REACH_TIMEOUT (300 s).

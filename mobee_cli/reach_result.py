@@ -22,11 +22,11 @@ class Result:
     """The result of a reach.
 
     `part`, `marker`: names of the part and of the marker that have reached. `why`: how they were chosen; empty if the user gave them.
-    `outcome`: outcome of the reach, as the plant reports it. `nearest`: the position nearest to the target that the marker can reach.
-    `reward`: reward of the reach. `expected`: the reward that the agent expected; None without an agent. `first_motion`: time from the
-    request to the first command that moves the robot [s]; None offline. `angle`: angle [rad] between the marker's normal and the direction
-    to the target at the end; None if the marker need not face the target. `path`: states to which the agent moved before the reach; empty
-    without an agent. `avoided`: transitions (state, goal) that were expected to fail.
+    `target`: the target. `outcome`: outcome of the reach, as the plant reports it. `nearest`: the position nearest to the target that the
+    marker can reach. `reward`: reward of the reach. `expected`: the reward that the agent expected; None without an agent. `first_motion`:
+    time from the request to the first command that moves the robot [s]; None offline. `angle`: angle [rad] between the marker's normal and
+    the direction to the target at the end; None if the marker need not face the target. `path`: states to which the agent moved before the
+    reach; empty without an agent. `avoided`: transitions (state, goal) that were expected to fail.
     """
 
     part: str

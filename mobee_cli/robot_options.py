@@ -30,7 +30,7 @@ def add_urdf_options(parser: argparse.ArgumentParser) -> None:
 
 
 def urdf_options(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Return the keywords of `mobee.load_robot` that the arguments give, by name; None for each that is not given."""
+    """Return the options for URDF files as keywords of `mobee.load_robot`, by name; None for an option that is not given."""
     return {name: getattr(arguments, name) for name in ("field", "meshes", "corners", "srdf", "home")}
 
 

@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run `mobee stop`: ask the launcher to end everything, wait for this, and return the exit code.
+    """Run `mobee stop`: ask the launcher to end everything, wait until it has ended, and return the exit code.
 
     Without a launcher, ask every service and then the router.
     """

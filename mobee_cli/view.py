@@ -61,7 +61,7 @@ def require_recording(save: Path | None) -> None:
 def show(robot: Robot, world: World | None, save: Path | None, stretches: Sequence[Any] | None = None, solids: bool = False) -> int:
     """Show the robot in motion on a page until Ctrl-C, or save the motion to a file; return the exit code.
 
-    `world`: objects around the robot. `save`: file to write; None: show a page. `stretches`: sections of the motion, as of
+    `world`: objects around the robot. `save`: file to write; None: show a page. `stretches`: sections of the motion, each a
     `services.monitor.viewer.view.Stretch`; None: every motor through its range. `solids`: show the solids (volumes by which contacts are
     found) instead of the visuals (surfaces in the robot file).
     """

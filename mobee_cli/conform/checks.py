@@ -152,7 +152,7 @@ def ownership(player: Player, part: str) -> None:
 
 
 def hold(player: Player, part: str) -> None:
-    """Test that a part which is not armed (released to follow commands) does not move when it receives some; raises Broken otherwise."""
+    """Test that a part does not move when it receives commands before it is armed; raises Broken otherwise."""
     player.take(part)
     start = player.q(part)
     player.keep(part, "velocity", lambda: _speed(player, part), MOTION)
@@ -163,7 +163,7 @@ def hold(player: Player, part: str) -> None:
 
 
 def obeys(player: Player, part: str) -> None:
-    """Test that an armed part, released to follow commands, obeys velocities and positions; raises Broken otherwise."""
+    """Test that a part, once it is armed, follows commands of velocities and positions; raises Broken otherwise."""
     with player.armed(part):
         start, speed = player.q(part), _speed(player, part)
         player.keep(part, "velocity", lambda: speed, MOTION)

@@ -200,7 +200,7 @@ class Player:
     def keep(self, part: str, mode: Mode, ref: Callable[[], Array], seconds: float, **changed: Any) -> None:
         """For `seconds` s, answer every tick with a valid command to a part.
 
-        `ref`: returns the position [rad] or velocity [rad/s] to command, (n_part,), by `mode`. `changed`: as of `send`.
+        `ref`: returns the position [rad] or velocity [rad/s] to command, (n_part,), by `mode`. `changed`: as in `send`.
         """
         end = time.monotonic() + seconds
         while time.monotonic() < end:

@@ -112,7 +112,7 @@ def _of_agent(agent: CuriousAgent) -> dict[str, Any]:
 def opened(setup: Setup, robot: Robot, store: Path) -> Iterator[Learning]:
     """Create the agents of a setup on an offline plant, for the block of a `with` statement. Raises MobeeError if this is not possible.
 
-    `robot`: the robot as the live system reads it from its file, so that both have exactly the same spaces. `store`: file of the
+    `robot`: the robot as the live system reads it from its file, so that both have exactly the same state spaces. `store`: file of the
     transitions. Transitions that it already contains are learned first.
     """
     world = world_around(setup.world, setup.shipped or store)

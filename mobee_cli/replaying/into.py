@@ -35,9 +35,9 @@ _NO_INPUT = ("/rpc/mark", "/rpc/shutdown")  # calls that change no result
 class Role:
     """The messages that a service reads and sends in a tick, as names of message types.
 
-    `with_tick`: messages of the model that the service needs to answer a tick; they are played right after the tick. `after`: messages of
-    other services, played before the next tick. `says`: messages of the service that are compared. `answers`: function that returns whether
-    a message is the service's answer to a tick.
+    `with_tick`: messages of the model without which the service cannot answer a tick; they are played right after the tick. `after`:
+    messages of other services, played before the next tick. `says`: messages of the service that are compared. `answers`: function that
+    returns whether a message is the service's answer to a tick.
     """
 
     with_tick: tuple[str, ...]
@@ -60,8 +60,8 @@ ROLES: Mapping[str, Role] = {
 class Result:
     """The result of a replay into a service.
 
-    `who`: the service. `ticks`: number of compared ticks. `messages`: number of compared messages, `says`: the same by type. `calls`:
-    number of repeated calls. `seconds`: real time [s]. `difference`: the first difference; None: all messages are equal.
+    `who`: the service. `ticks`: number of compared ticks. `messages`: number of compared messages. `says`: number of compared messages
+    by type. `calls`: number of repeated calls. `seconds`: real time [s]. `difference`: the first difference; None: all messages are equal.
     """
 
     who: str

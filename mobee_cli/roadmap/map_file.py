@@ -131,7 +131,7 @@ def edge_summary(trm: Roadmap) -> list[str]:
 def as_json(trm: Roadmap, path: Path) -> dict[str, Any]:
     """Return a description of a roadmap as plain JSON data. `path`: path of the roadmap's file.
 
-    "poses", "edges": number of poses and of edges. "parts": number of poses of each connected part. "names", "spacing", "low", "high":
+    "poses", "edges": number of poses and of edges. "parts": number of poses of each connected component. "names", "spacing", "low", "high":
     name, distance between vertices, smallest and largest value of each task coordinate. "settings": settings with which the roadmap was
     built.
     """

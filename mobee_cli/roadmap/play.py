@@ -104,11 +104,11 @@ def result_of(trm: Roadmap, path: dict[str, Any], played: Played, tolerance: flo
     """Return the result of a motion as plain JSON data; lengths in m, angles in rad, times in s.
 
     `path`: as returned by `mobee_cli.roadmap.query.find_path`. `tolerance`: largest remaining error of the marker [mm] at which the robot
-    has arrived. Keys of the result: "place": goal in task coordinates. "remaining_error": distance of the roadmap's marker from its goal;
-    "markers": the same of every marker. "rested": whether the robot came to rest. "lag", "off", "missing": largest distance of a motor from
-    its planned position at the same time, from the nearest planned pose, and from its goal at the end. "solid", "field": depth of the
-    deepest contact of solids, and of fields (volumes that cause repulsive forces). "touched": names of the pairs in the deepest solid
-    contact.
+    has arrived. Keys of the result: "place": task coordinates of the last vertex of the path. "remaining_error": distance of the roadmap's
+    marker from its goal; "markers": the same of every marker. "rested": whether the robot came to rest. "lag": largest distance of a motor
+    from its planned position at the same time; "off": from the nearest planned pose; "missing": from its goal at the end. "solid", "field":
+    depth of the deepest contact of solids, and of fields (volumes that cause repulsive forces). "touched": names of the pairs in the
+    deepest solid contact.
     """
     pose = trm.model.evaluate(np.array([played.q[-1], path["poses"][-1]]))
     markers = {name: float(np.linalg.norm(np.diff(pose.position(name), axis=0))) for name in trm.model.robot.markers}

@@ -50,11 +50,11 @@ def find_path(trm: Roadmap, start: Array, goal: list[float]) -> dict[str, Any]:
     that the roadmap does not move stay where they are, if they are less than 0.25 rad from their positions in the roadmap. Raises UserError
     if the roadmap has no path at all.
 
-    Keys of the result: "vertices": indices of the path's vertices. "place": task coordinates of the last one; "missing": their distances
-    from the goal, in spacings of the roadmap. "poses": (K, n) rad, from the start. "length": length of the path [rad]. "entry": largest
-    motor angle from the start to the first vertex [rad]. "largest_step": largest motor angle between two poses [rad]. "seconds": duration
-    of the motion. "shortest": whether no path with contacts is shorter. "free": False if the path has contacts; "why": then the reason,
-    otherwise empty.
+    Keys of the result: "vertices": indices of the path's vertices. "place": task coordinates of the last one; "missing": its distance from
+    the goal in each task coordinate, in multiples of the distance between vertices. "poses": (K, n) rad, from the start. "length": length
+    of the path [rad]. "entry": largest motor angle from the start to the first vertex [rad]. "largest_step": largest motor angle between
+    two poses [rad]. "seconds": duration of the motion. "shortest": whether no path with contacts is shorter. "free": False if the path has
+    contacts; "why": then the reason, otherwise empty.
     """
     shortest = _shortest(trm, start, goal)
     stay = np.abs(start - trm.q[shortest[0]]) < NEAR_TURN

@@ -85,7 +85,7 @@ def marker_of(trm: Roadmap) -> str:
         raise UserError(f"robot {robot.name!r} has no markers to show", BAD_INPUT)
     named = [marker for marker in robot.markers if any(name.startswith(marker) for name in trm.names)]
     if named or not len(trm.q):
-        return (named or list(robot.markers))[0]
+        return max(named, key=len) if named else next(iter(robot.markers))  # a name may begin with that of another marker
     pose = trm.model.evaluate(trm.q)
     return max(robot.markers, key=lambda marker: float(np.ptp(pose.position(marker), axis=0).max()))
 
@@ -94,9 +94,9 @@ TOUR_PLACES = 8
 
 
 def tour(trm: Roadmap, places: int = TOUR_PLACES) -> list[Stretch]:
-    """Return a tour through the roadmap, as sections of a motion: paths between places that are far apart, one after the other.
+    """Return a tour through the roadmap as sections of a motion; each section is a path from one place to another that is far away.
 
-    The tour stays in the largest connected part of the roadmap, and begins at its middle. `places`: number of places.
+    The tour stays in the largest connected component of the roadmap, and begins at its middle. `places`: number of places.
     """
     from services.monitor.viewer.view import RATE, Stretch  # imports rerun
 

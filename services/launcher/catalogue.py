@@ -15,12 +15,13 @@ RECORDER = "recorder"
 class Entry:
     """The fixed properties of a service, which do not depend on its settings.
 
-    `module`: program, run with `python -m mobee_system.run`. `config`: class of its settings, as "module:class". `stage`: place in the
-    order of the services; the last stage is stopped first. `after`: services that must be ready before it joins the system. `nice`:
-    niceness of its process. `vital`: whether the robot is stopped if the launcher gives the service up. `participates`: in lockstep,
-    whether every tick waits for its answer. `may_end`: whether it may end by itself without a failure. `real_time`: its results depend on
-    real time, so it does not run in lockstep. `needs`: Python packages that it imports, each with the extra of this project that installs
-    it. `given`: settings that follow from the name of the service.
+    `module`: program, run with `python -m mobee_system.run`. `config`: class of its settings, as "module:class". `stage`: number
+    of its group; groups are listed in ascending order, and stopped in descending order. `after`: services that must be ready before it
+    joins the system. `nice`: niceness of its process. `vital`: whether the robot is stopped if the launcher gives the service up (does not
+    restart it any more). `participates`: in lockstep, whether every tick waits for its answer. `may_end`: whether it may end by itself
+    without a failure. `real_time`: its results depend on real time, so it does not run in lockstep. `needs`: Python packages that it
+    imports, each with the extra of this project that installs it. `given`: settings that follow from the name of the service, such as the
+    part of an agent.
     """
 
     module: str
@@ -37,7 +38,7 @@ class Entry:
 
     @property
     def has_standby(self) -> bool:
-        """Whether a standby process may wait beside the service: it is vital, and its program is not a user's.
+        """Whether a second process of the service may wait to replace the first: the service is vital, and its program is not a user's.
 
         Two processes of a user's program could open the same hardware.
         """

@@ -162,9 +162,9 @@ def check_rate(scenario: Scenario, robots: Mapping[str, Robot]) -> None:
 
 
 def check_lockstep(scenario: Scenario) -> None:
-    """Raise ConfigError if only some services are set to lockstep, or if a number of ticks is set in free mode.
+    """Raise ConfigError if only some services are set to lockstep, or if a number of ticks is set without lockstep.
 
-    In free mode the number would not be exact.
+    In lockstep every tick waits for all participants; without it, the run would not end after exactly this number of ticks.
     """
     modes = {part.who: part.config.mode for part in scenario.parts}
     if len(set(modes.values())) > 1:
@@ -182,7 +182,7 @@ def check_lockstep(scenario: Scenario) -> None:
 def check_robots(scenario: Scenario) -> dict[str, Robot]:
     """Load the robots of all services; return a dict from the name or path in their settings to the robot.
 
-    Raises ConfigError with a message of one line if a robot or world cannot be read, if its file has elements that the reader would ignore,
+    Raises ConfigError with a message of one line if a robot or world cannot be read, if its file has elements that would be ignored,
     or if a service names a part or motor that its robot does not have.
     """
     from mobee.model.world_file import load_world

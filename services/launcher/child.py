@@ -50,7 +50,7 @@ class Watched(Protocol):
 
     @property
     def stat(self) -> Stat | None:
-        """The last status (`stat` call) that the present process has answered; None before the first."""
+        """The last answer of the present process to the call `stat` (its status); None before the first answer."""
 
     @property
     def reason(self) -> str:
@@ -65,10 +65,10 @@ class Watched(Protocol):
 class Program:
     """The command of one service process, and the rules for its supervision.
 
-    `who`: name of the service. `argv`: command. `log`: file of its standard output and error. `stage`: place in the order of the services;
-    the last stage is stopped first. `after`: services that must be ready before it joins the system. `nice`: niceness of its process.
-    `vital`: whether the robot is stopped if the launcher gives the service up. `standby`: whether a second process of it may wait, in order
-    to replace the first. `may_end`: whether it may end by itself without a failure.
+    `who`: name of the service. `argv`: command. `log`: file of its standard output and error. `stage`: number of its group; groups are
+    stopped in descending order. `after`: services that must be ready before it joins the system. `nice`: niceness of its process. `vital`:
+    whether the robot is stopped if the launcher gives the service up (does not restart it any more). `standby`: whether a second process
+    of it may wait, in order to replace the first. `may_end`: whether it may end by itself without a failure.
     `patience`: least time without an answer [s] after which it may count as frozen. `environment`: variables that are added to the
     launcher's own.
     """
@@ -95,11 +95,11 @@ class Child:
     whether the process has its liveliness token on the bus. `asked_at`, `answered_at`: times of the last `stat` call and the last answer.
     `asking`: a call waits for its answer. `unanswered`: number of calls in a row without an answer. `stat`: last answer of the present
     process. `standby`: process that replaces the present process when this one fails. `has_prepared`: a standby process was started since
-    the last start. `reason`: reason of the last failure.
+    the last start. `reason`: reason of the last failure. `host`: always empty.
 
-    While the service is silent, that is, does not answer: `handled`: number of messages that it had handled at the last pulse.
-    `advanced_at`: time at which this number was last seen to grow. `starvation`: time in which the service or the launcher waited for a
-    processor.
+    While the service does not answer `stat` calls, it is asked by `pulse` calls how many messages it has handled. `handled`: the last
+    answer. `advanced_at`: time at which this number was last seen to grow. `starvation`: time in which the service or the launcher waited
+    for a processor.
     """
 
     program: Program
@@ -196,9 +196,9 @@ class Child:
         self.starvation = Starvation((self.pid, os.getpid()), now)
 
     def note_pulse(self, handled: int, when: float) -> None:
-        """Record how many messages the service has handled by the monotonic time `when` [s].
+        """Record an answer to the call `pulse`: how many messages the service has handled by the monotonic time `when` [s].
 
-        If the number has grown since the last pulse of this silence, the service is alive.
+        If the number has grown since the last such answer, the service is slow, not frozen: its silence is measured from `when` on.
         """
         if self.handled is not None and handled > self.handled:
             self.advanced_at = when

@@ -36,10 +36,10 @@ class JoinRefused(Exception):
 
 
 class Agreement(Struct, frozen=True, kw_only=True):
-    """What the launchers of two hosts must agree on. The first launcher returns it as the answer to the call `config`.
+    """What the launchers of two hosts must agree on. The first launcher, whose host runs the router, sends it as JSON if called `config`.
 
-    `version`: version of MoBeE. `instance`: id of the first launcher's process, whose host runs the router. `elsewhere`: services that
-    other hosts start. `services`: settings of all services, by name, without settings that may differ between hosts, such as ports.
+    `version`: version of MoBeE. `instance`: id of the first launcher's process. `elsewhere`: services that other hosts start. `services`:
+    settings of all services, by name, without settings that may differ between hosts, such as ports.
     """
 
     version: str

@@ -26,11 +26,12 @@ SERVICES = "services"  # word in the status of the launcher of another host: the
 class Remote:
     """State of a service that another host runs, as this launcher observes it by liveliness tokens and `stat` calls.
 
-    Times are monotonic, in s. `who`: name. `phase`: waiting (for other services), starting, ready, failed (to be restarted), fault (given
-    up) or ended. `since`: time of the last change of phase. `absent_since`: time at which it was last ready; None: it is ready now, or
-    never was. `instance`: id of the present process; empty: there is none. `known`: id of the last process. `asked_at`, `answered_at`:
-    times of the last `stat` call and the last answer. `unanswered`: number of calls in a row without an answer. `reason`: reason of the
-    last failure.
+    Times are monotonic, in s. `who`: name. `vital`: whether the robot is stopped if the service is given up. `phase`: waiting (not yet
+    present), starting, ready, failed (absent or silent) or fault (given up). `since`: time of the last change of phase. `absent_since`:
+    time at which it was last ready; None: it is ready now, or never was. `host`: name of the host that runs it; empty: not known.
+    `instance`: id of the present process; empty: there is none. `known`: id of the last process. `restarts`: number of changes to another
+    process. `asking`: a `stat` call waits for its answer. `asked_at`, `answered_at`: times of the last `stat` call and the last answer.
+    `unanswered`: number of calls in a row without an answer. `stat`: last answer. `reason`: reason of the last failure.
     """
 
     who: str
@@ -70,9 +71,9 @@ class Remote:
 
 
 class Remotes:
-    """Observes all services of other hosts by their liveliness tokens and their answers.
+    """Observes all services of other hosts by their liveliness tokens and their answers to `stat` calls.
 
-    All its work is done in the main thread, by handlers of the launcher's `service`.
+    `services`: the state of each service, by name. All its work is done in the main thread, by handlers of the launcher's `service`.
     """
 
     def __init__(
@@ -97,7 +98,7 @@ class Remotes:
         service.on_alive(self._note_token)
 
     def begin(self) -> None:
-        """Start the regular checks."""
+        """Start to check all services every 0.1 s."""
         self._check_all()
 
     def end_hosts(self) -> None:

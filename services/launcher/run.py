@@ -99,8 +99,9 @@ class Options:
 def launch(options: Options) -> int:
     """Run a scenario to its end and return the exit code.
 
-    0: ended normally; 1: a service was given up; 2: the input is not valid; 3: a fault of the environment; 130: ended early by Ctrl-C. If
-    this launcher has joined the system of another host, and that system is started again, it joins the new one.
+    0: ended normally; 1: a service was given up; 2: the input is not valid; 3: a fault of the environment, such as a port in use; 130:
+    interrupted by Ctrl-C before a service was started. If this launcher has joined the system of another host, and that system is started
+    again, this launcher joins the new system.
     """
     while True:
         with contextlib.ExitStack() as open_meanwhile:

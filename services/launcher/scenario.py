@@ -48,7 +48,7 @@ class Scenario:
     """The services to launch, in the order in which they are listed and started.
 
     `name`: name of the file. `title`: text for the user. `shared`: settings for all services that have a field of that name. `parts`: the
-    services. `where`: returns the place of a field, such as "shared.robot", in the file, for messages.
+    services. `where`: function from the name of a field, such as "shared.robot", to its place in the file, for messages.
     """
 
     name: str
@@ -100,7 +100,8 @@ def read_scenario(
         record: whether to add the recorder, if the scenario has the shipped robot_sim.
 
     Raises:
-        ConfigError: with a message of one line: the place, the field, and the nearest valid name.
+        ConfigError: the file cannot be read, or a name or value in it is not valid. The message has one line with the place, the field and
+            the nearest valid name.
     """
     path = _find(name_or_path)
     try:

@@ -24,8 +24,8 @@ _AT_ONCE = 4  # reports of one check: who tries a new key each time must not fil
 class Security:
     """The keys of one run of the system (`mobee launch`).
 
-    `folder`: folder of the keys. `router`: identity of the router. `access`: access list of the router, which says who may use which keys
-    of the bus. `expiring`: texts about identities that expire soon.
+    `folder`: folder of the keys. `router`: identity (private key and certificate) of the router. `access`: access list of the router:
+    the topics of the bus that each identity may use. `expiring`: texts about identities that expire soon.
     """
 
     def __init__(self, folder: Path, here: Scenario, *, launcher: str = LAUNCHER, elsewhere: Sequence[str] = ()) -> None:
@@ -52,7 +52,7 @@ class Security:
 
 
 class Refusals:
-    """Publishes an event for everything that the router refuses.
+    """Publishes an event for each connection or message that a secured router refuses.
 
     The same refusal is published at most once in 10 s, with the number of times that it occurred.
     """

@@ -24,10 +24,10 @@ class _Thread:
 
 
 class Starvation:
-    """Measures how long at least one of several processes has been without a processor, from the Linux scheduler's counts.
+    """Measures how long several processes have waited for a processor, from the counts of the Linux scheduler.
 
-    `total`: this time [s] since the start of the measurement; 0 where Linux does not report it. A call passes through several threads,
-    which may wait one after the other; therefore the waits of all threads are added up, but count at most as the time that has passed.
+    `total`: this time [s] since the start of the measurement; 0 where Linux does not report it. It is the sum over all threads of the
+    processes, because a call passes through several threads one after the other. Between two updates it grows at most by the time passed.
     """
 
     def __init__(self, pids: tuple[int, ...], now: float) -> None:

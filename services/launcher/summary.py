@@ -12,13 +12,14 @@ from services.launcher.child import Watched
 
 
 def summarise(children: Iterable[Watched]) -> dict[str, Any]:
-    """Return the numbers of a run by name, as JSON data; None for a number that was not measured.
+    """Return the measurements of a run by name, as JSON data; None for a number that was not measured.
 
-    "agents": numbers of transitions, timeouts and interruptions and the mean time of an action, of each agent by part. "..._ticks": number
-    of ticks with the event. "rejected_commands": number of refused commands, by reason. "command_age_ticks": percentiles of the age of
-    commands. "lockstep": ticks, speed and repeatability of a run in lockstep (every tick waits for all participants). "restarts",
-    "services": restarts and all numbers of each service, by name. Lengths are in m, times in s, ages in ticks. Counters begin when every
-    service was ready, or at the last restart of their service.
+    "agents": for the agent of each part, the counts of transitions, timeouts and interruptions, and the mean time of an action.
+    "..._ticks": number of ticks with the event. "pairs_watched": number of pairs of bodies that are tested for contact.
+    "rejected_commands": number of refused commands, by reason. "command_age_ticks": percentiles of the age of commands. "lockstep": ticks,
+    speed and repeatability of a run in lockstep (every tick waits for all participants). "restarts", "services": restarts and all numbers
+    of each service, by name. Lengths are in m, times in s, ages in ticks. Counters begin when every service was ready, or at the last
+    restart of their service.
     """
     stats = {child.who: child.stat for child in children if child.stat is not None}
     sim, model = _Numbers(stats.get("robot_sim")), _Numbers(stats.get("model"))

@@ -89,7 +89,7 @@ class Supervisor:
         return all(child.phase in ("ready", "ended", "fault") for child in self.children.values())
 
     def has_arrived(self) -> bool:
-        """Return whether robot_sim has reached its last tick, if a number of ticks is set."""
+        """Return whether robot_sim has reached its last tick; always False if no number of ticks is set."""
         sim = self.children.get("robot_sim")
         return sim is not None and sim.stat is not None and (sim.stat.numbers.get("arrived") or 0) > 0
 

@@ -83,7 +83,8 @@ class _Taken:
 class PageControls:
     """Executes the commands of all pages.
 
-    The threads of the web server call it, one at a time; each waits for the answers of other services.
+    The threads of the web server call it. It executes one command at a time, except "stop", which does not wait for other commands. A call
+    returns when the other services have answered.
     """
 
     def __init__(self, service: Service, robot: Robot, known: Known, board: Board, show_fields: Callable[[bool], None]) -> None:

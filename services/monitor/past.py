@@ -103,7 +103,7 @@ def _tracks(found: Sequence[Entry]) -> dict[str, Track]:
 
 
 def object_of(recorded: Mapping[str, Any]) -> ObjectState:
-    """Convert the record of an object of the world, JSON data as of `services.monitor.web.body.thing`, to an ObjectState."""
+    """Convert the record of an object of the world, JSON data as returned by `services.monitor.web.body.thing`, to ObjectState."""
     turn = quaternion_from_matrix(np.array(recorded["rotation"])[None])[0].tolist()
     geometry = Geometry(recorded["kind"], recorded["size"])
     return ObjectState(recorded["name"], geometry, recorded["position"], turn, recorded["role"], "")

@@ -30,7 +30,7 @@ class Motion:
 class Share:
     """The command of each of the d joints in a substep: a torque if the joint is `free`, otherwise a velocity; all arrays (d,).
 
-    `torque`: N m, torque behind the gear; 0 for a joint that is not free. `velocity`: rad/s.
+    `torque`: N m, torque of the gear on the joint; 0 for a joint that is not free. `velocity`: rad/s; 0 for a joint that is free.
     """
 
     free: Mask
@@ -42,8 +42,8 @@ class Gears:
     """Computes the torques that gears transmit to joints: solves a substep of motor, gear and arm together by an implicit method.
 
     A geared motor adds its rotor's inertia and its friction to its joint: (M + INERTIA) a = torque - FRICTION v - bias + outside. Both are
-    far larger than the inertia of a wrist, so an explicit step of 5 ms would diverge. The external torque `outside` (contacts) is taken
-    from the last substep: it is the difference between the motion of the joints and the computed motion.
+    far larger than the inertia of a wrist, so an explicit step of 5 ms would diverge. The external torque `outside` (contacts) is
+    estimated from the last substep: the torque that the joints' acceleration required, minus the torque that the gears transmitted.
     """
 
     def __init__(self, joints: int) -> None:

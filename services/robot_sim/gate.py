@@ -29,8 +29,8 @@ from services.common.service import CallRefused
 class Limits:
     """Limits of the motors of a part, each of shape (n_part,).
 
-    `lower`, `upper`: rad. `velocity`: rad/s. `acceleration`: rad/s^2. `torque`: N m. `fine`: the length by which a threshold of 1 rad is
-    replaced for a motor that slides (`mobee.robot.motor_units`); 1 for motors that turn.
+    `lower`, `upper`: rad. `velocity`: rad/s. `acceleration`: rad/s^2. `torque`: N m. `fine`: factor for thresholds in rad: 1 for
+    a motor that turns; for a motor that slides, the length [m] that counts as 1 rad (`mobee.robot.motor_units.fine_units`).
     """
 
     lower: Array
@@ -57,9 +57,9 @@ class Limits:
 class Order(Struct, frozen=True, eq=False):
     """A command to one part, as it arrived in `Command` or `Commands`.
 
-    `src`, `seq`: sender and its number of the message. `epoch`: number of the sender's ownership. `re_k`: tick that the command answers.
-    `reference`: (n_part,) rad, rad/s or N m, by `mode`. `ttl`: in free mode, time from the start of that tick after which the command ends,
-    ms.
+    `src`: sender. `seq`: sequence number of the message. `epoch`: number of the sender's ownership of the part. `re_k`: tick that the
+    command answers. `reference`: (n_part,) rad, rad/s or N m, by `mode`. `ttl`: time [ms] from the start of tick `re_k` after which the
+    command is not in force any more; in lockstep a fixed number of ticks counts instead.
     """
 
     src: str
@@ -123,7 +123,10 @@ class Admission:
         self._most_strides = max_ticks or max(round(MAX_AGE / dt), 1)
 
     def check(self, order: Order, k: int) -> None:
-        """Raise Refused if an order that arrives in tick k is not valid: number and limits of its references, age in ticks, or ttl [ms]."""
+        """Raise Refused if an order that arrives in tick k is not valid.
+
+        Checked are the number of its references, their limits, the age of the order in ticks, and its ttl.
+        """
         reference = order.reference
         if reference.shape != self._lower.shape:
             raise Refused("length", f"{self._part}: {reference.size} numbers for {self._lower.size} motors")
@@ -136,7 +139,7 @@ class Admission:
             raise Refused("ttl", f"{self._part}: ttl {order.ttl} ms, valid: 1 to {MAX_TTL}")
 
     def check_step(self, reference: Array, before: Array | None, ticks: int, q: Array) -> None:
-        """Check that a position command is not too far from the one before.
+        """Raise Refused if a position command is too far from the last one.
 
         Args:
             reference: commanded position, (n_part,) rad.
@@ -215,9 +218,10 @@ class Shaper:
         return self._asked.position.copy()
 
     def runs_out(self, q: Array, velocity: Array) -> bool:
-        """Return whether a motor is too fast to stop before its position limit, by more than it brakes in a tick.
+        """Return whether a motor is too fast to stop before its position limit.
 
-        `q` [rad], `velocity` [rad/s]: measured, (n_part,) each.
+        An excess of less than the largest change of velocity in one tick is tolerated. `q` [rad], `velocity` [rad/s]: measured, (n_part,)
+        each.
         """
         return self._asked.runs_out(q, velocity)
 
@@ -297,7 +301,7 @@ class Gate:
     def take(self, who: str, instance: str) -> int:
         """Set a new owner of the part; return the epoch, the number of the new ownership. Later commands of the old owner are refused.
 
-        `who`: name of the owner's service. `instance`: last chunk of its liveliness token.
+        `who`: name of the owner's service. `instance`: id of its process, as in its liveliness token.
         """
         self.epoch += 1
         self.owner = (who, instance)

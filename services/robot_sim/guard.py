@@ -57,7 +57,7 @@ class Guard:
         return "" if self._stop is None else str(self._stop)
 
     def on_answer(self, handler: Callable[[str, int, Answer], None]) -> None:
-        """In lockstep, call handler(service, tick, answer) for each answer to a tick that comes in a message of commands."""
+        """Set the handler of answers to ticks that arrive in a `Commands` message in lockstep; called with service, tick and answer."""
         self._on_answer = handler
 
     def reset(self) -> None:
@@ -93,9 +93,9 @@ class Guard:
         self._waiting.clear()
 
     def hold_dependents(self, who: str) -> None:
-        """Put the parts that the late service `who` owns in hold: they brake and stand still.
+        """Put all parts of which the service `who` is the owner in hold, because `who` is late: they brake and stand still.
 
-        If it is the model, the router or the launcher, all parts are put in hold.
+        If `who` is the model, the router or the launcher, all parts are put in hold.
         """
         if who in INDISPENSABLE:
             self.hold_all(f"{who} is late")

@@ -25,9 +25,9 @@ class BackendUnavailable(InvalidValue):
 
 @dataclass(frozen=True, slots=True)
 class SolidContact:
-    """The deepest solid contact of a tick. `depth`: m. `pair`: the two sorted names with a blank between them.
+    """The deepest solid contact of a tick, between two links, or a link and an object.
 
-    Without a contact, depth is 0 and pair empty.
+    `depth`: m; 0 without a contact. `pair`: the two names, sorted, with a blank between them; empty without a contact.
     """
 
     depth: float = 0.0
@@ -60,6 +60,7 @@ class Backend(Protocol):
     notes: Sequence[str]
     """Assumptions of the back-end about the robot, for the user, one sentence each."""
     pairs_watched: int
+    """Number of pairs (of links, or of a link and an object) that the back-end tests for solid contact."""
 
     @property
     def motors(self) -> Motors:

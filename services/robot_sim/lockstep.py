@@ -15,7 +15,10 @@ START_PERIOD = 0.05  # s between two repetitions of tick 0
 
 
 class Lockstep:
-    """Lockstep in robot_sim: the barrier of a run, and the number of events that made the run unrepeatable."""
+    """Lockstep in robot_sim: waits in every tick for the answers of all participants, and counts flaws.
+
+    `flaws`: number of events that made the run unrepeatable.
+    """
 
     def __init__(self, service: Service, participants: tuple[str, ...], guard: Guard, last_tick: int) -> None:
         """`participants`: services that must be present before tick 1. `last_tick`: tick at which the run ends; 0: it does not end."""
@@ -28,7 +31,7 @@ class Lockstep:
         self._began = self._answered = 0.0  # monotonic clock: tick 1, the last tick
 
     def begin(self) -> None:
-        """Begin a new run, in which no participant is present and no flaw is counted."""
+        """Begin a new run: no participant has answered yet, and the count of flaws is 0."""
         self._barrier.begin()
         self.flaws, self._reported = 0, -EVENT_PERIOD
 

@@ -34,9 +34,9 @@ GeomPair = tuple[str, str]
 class MujocoScene:
     """The robot and its world in MuJoCo: the compiled model, its state, and the degrees of freedom and constraints of each motor.
 
-    A motor acts on one of its joints: the one with the largest scale. The other joints of the motor follow this joint. A motor is a
-    constraint that brings its joint to a velocity with a limited torque: MuJoCo's friction, which normally brings a joint to the velocity
-    0, but here to a velocity that is set for every substep.
+    A motor acts on one of its joints: the one with the largest absolute scale. The other joints of the motor follow this joint. A motor is
+    a constraint that brings its joint to a given velocity with a limited torque. It uses MuJoCo's dry friction of joints, whose desired
+    velocity is normally 0, but here is set for every substep.
 
     Arrays of the n motors: `scale`, `offset` (n,): joint position = scale * motor position + offset. `dofs` (n,): degree of freedom of the
     joint in MuJoCo. `rows` (n,): row of the motor's constraint in MuJoCo.
@@ -259,7 +259,7 @@ def _share(amount: float, motor: Motor, scale: float) -> float:
 
 
 def touching_at_home(robot: Robot, world: World) -> dict[frozenset[str], float]:
-    """Return a dict from each pair of solids (set of two names) that the model finds in contact at home to the depth [m]."""
+    """Return the depth [m] of each contact that the model finds at home, by the pair of solids (set of two names)."""
     contacts = Model(robot, world).evaluate(robot.home).contacts
     return {frozenset((one.first, one.second)): one.depth for one in contacts if one.kind == "solid"}
 

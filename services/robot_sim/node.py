@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs robot_sim: in every tick gate, clock, physics, then each part's state at its own time; in lockstep the states come first."""
+"""Runs robot_sim. In every tick come the gates, the clock, the physics, and then the state of each part at its own sampling time.
+
+In lockstep the states are read and published before the clock.
+"""
 
 from __future__ import annotations
 

@@ -4,7 +4,8 @@
 Reads: clock, {part}/state, sim/truth (where the simulator has its objects); with optics = "dragonfly" tick in place of the states.
 Writes: vision/image/{camera}, vision/camera/{camera}; only while there are subscribers.
 
-Imperfect pictures are drawn while their latency passes: as soon as the truth is known until the end of the exposure.
+Pictures with optics = "dragonfly" (imperfect cameras) are published after a latency. They are drawn during this time, as soon as the true
+postures are known up to the end of the exposure.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The renderer's imperfect cameras: an exposure shows the simulator's true posture, and has the encoders at its stamp."""
+"""The renderer's imperfect cameras: pictures of the simulator's true posture, with an inexact time stamp and the encoder values at it."""
 
 from __future__ import annotations
 

@@ -62,9 +62,10 @@ def part_meta(robot: Robot, part: str) -> PartMeta:
 
 
 def errors_of(robot: Robot, errors: Mapping[str, float]) -> Array:
-    """Return the constant errors of all encoders (n,), rad, or m for motors that slide, from those that are given by motor.
+    """Return the constant errors of all encoders (n,), rad, or m for motors that slide.
 
-    Raises UnknownName for a name that is not a motor, and InvalidValue for an error that is not finite.
+    `errors`: error of an encoder by the name of its motor; the errors of motors that are not named are 0. Raises UnknownName for a name
+    that is not a motor, and InvalidValue for an error that is not finite.
     """
     found = np.zeros(len(robot.motors))
     for name, error in errors.items():

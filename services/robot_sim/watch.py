@@ -29,9 +29,9 @@ REST_SPEED = np.deg2rad(1.0)  # rad/s; a part whose motors are slower is at rest
 
 @dataclass(slots=True)
 class Stops:
-    """Statistics of how parts come to rest in hold: the stops in progress, and the largest time and distance of ended stops.
+    """Statistics of how parts come to rest in hold, in which they brake and stand still. A stop lasts from the last command to rest.
 
-    A part in hold brakes and stands still.
+    `count`: number of ended stops. `time_max`: largest duration of a stop [s]. `distance_max`: largest motion of a motor in a stop [rad].
     """
 
     count: int = 0
@@ -89,7 +89,7 @@ class Counters:
         self.tick_time = Percentiles()  # ms, gate to end of physics
 
     def count_gates(self, gates: Iterable[Gate]) -> None:
-        """Count the tick, the age of its oldest command, and whether all owned parts follow commands or one is in hold.
+        """Count the tick, the age of the oldest command in force, and whether all owned parts follow commands or at least one is in hold.
 
         `gates`: the safety gates of all parts. A part in hold brakes and stands still. Call this once per tick.
         """
@@ -247,7 +247,7 @@ class Watch:
         self.counters.missed_before = missed
 
     def reset(self) -> None:
-        """Drop what belongs to the last run; call this at the start of a new run."""
+        """Drop the stops in progress; call this at the start of a new run. The counts of the measurement continue."""
         self.counters.stops.forget()
 
     def measure(self) -> None:
@@ -281,7 +281,7 @@ class Watch:
                 self._bus.event("info", "stopped", f"{part} came to rest", time=stopped[0], distance=stopped[1])
 
     def publish_truth(self) -> None:
-        """Publish the true state if it is due in this tick and there is a subscriber."""
+        """If the true state is due in this tick, measure the gap to the obstacles; publish the state if there is a subscriber."""
         if self._bus.k % self._truth_period:
             return
         gap = self._backend.gap()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Makes a short film of a run: the robot, the hand positions of its agents' states, and the story of the agents."""
+"""Makes a short film of a run: the robot, the hand position in each state of its agents, and text about what the agents do and learn."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ class RobotView:
     def picture(self, values: dict[str, Any]) -> Any:
         """Return the picture of the robot as a Pillow image.
 
-        `values`: the recorded values at one time, as of `services.monitor.past.Story.at`, and `q`, the pose (n,) rad.
+        `values`: the recorded values at one time, as returned by `services.monitor.past.Story.at`, and `q`, the pose (n,) rad.
         """
         from PIL import Image, ImageDraw
 

@@ -31,8 +31,8 @@ class StoryView:
     def draw(self, ink: Any, values: dict[str, Any], box: tuple[int, int, int, int]) -> None:
         """Draw the cards of the agents, one below the other, and below them a panel with their learning curves.
 
-        `ink`: drawing context of Pillow. `values`: recorded values at one time, as of `services.monitor.past.Story.at`. `box`: left, top,
-        right and bottom [pixels].
+        `ink`: drawing context of Pillow. `values`: recorded values at one time, as returned by `services.monitor.past.Story.at`. `box`:
+        left, top, right and bottom [pixels].
         """
         left, top, right, bottom = box
         cards = values.get("cards", [])[:MOST]

@@ -40,7 +40,8 @@ class Outcomes:
 def outcomes_of(learned: Learned, known: Knowledge, space: Space) -> Outcomes:
     """Return the outcomes that an agent has observed in each state-action, with their relative frequencies as probabilities.
 
-    A state-action that was never tried reaches its goal with the success rate of all the agent's tries; otherwise it stays in its state.
+    A state-action that was never tried has two outcomes: its goal, with the success rate of all the agent's tries as probability, and else
+    the state in which it begins.
     """
     found: dict[tuple[int, int], list[tuple[int, float]]] = {}
     (count, actions), missed = known.tries.shape, np.zeros(known.tries.shape)
@@ -67,8 +68,8 @@ def baselines(outcomes: Outcomes, exists: NDArray[np.bool_], start: int, transit
 
     A learning curve is a list of points (number of transitions, share of the state-actions that were tried, share that are predictable), as
     in `Curve`; it is the mean of 4 simulations. `outcomes`: the possible outcomes of all state-actions, with their probabilities. `exists`:
-    (S, A), True where the state has the action. `start`: state in which every simulation begins. `transitions`: length of a simulation;
-    above LONGEST (10 000) it is LONGEST.
+    (S, A), True where the state has the action. `start`: state in which every simulation begins. `transitions`: number of
+    transitions of a simulation, of which at most LONGEST (10 000) are simulated.
     """
     transitions = min(transitions, LONGEST)
     rng = np.random.default_rng(SEED)

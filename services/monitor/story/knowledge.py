@@ -17,11 +17,11 @@ from mobee.learning.space import Space
 
 @dataclass(frozen=True, eq=False)
 class Knowledge:
-    """What an agent knows about its state-actions, as arrays (S, A): S states with at most A actions each.
+    """What an agent knows about its state-actions. All arrays are (S, A): S states with at most A actions each.
 
     `exists`: whether the state has the action. `tries`: number of tries. `reward`: information gain of the last try [nats]. `value`: action
-    value, -inf where there is no action. `usual`: share of the most frequent outcome. `n`: number of transitions that the agent has
-    observed. `state`: the agent's present state.
+    value, -inf where there is no action. `usual`: share of the tries that had the most frequent outcome. `n`: number of transitions that
+    the agent has observed. `state`: the agent's present state.
     """
 
     exists: NDArray[np.bool_]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Computes the position of a part's hand in each state of an agent's space."""
+"""Computes the position of a part's hand in each state of an agent's state space."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ MAX_STATES = 4096  # more places could not be distinguished
 
 
 def space_of(settings: str, robot: Robot) -> Space | None:
-    """Rebuild the space of an agent from the JSON text in a `Learned` message; None if the settings are not valid for this robot."""
+    """Rebuild an agent's state space from `settings`, the JSON text in its `Learned` messages; None if it is not valid for this robot."""
     try:
         return space_from(json.loads(settings), robot)
     except (MobeeError, ValueError, TypeError, RecursionError):  # of another robot or version: its numbers cannot be placed
@@ -32,7 +32,8 @@ def space_of(settings: str, robot: Robot) -> Space | None:
 class Spot:
     """A point on a link by which a part is shown, such as the palm of an arm.
 
-    `link`: index of the link. `position`: (3,) m, in the root frame with every joint at zero.
+    `name`: marker at the point, or a description. `link`: index of the link. `position`: (3,) m, in the root frame with every joint at
+    zero.
     """
 
     name: str
@@ -43,8 +44,8 @@ class Spot:
 def shown_spot(robot: Robot, part: str) -> Spot | None:
     """Return the point by which a part is shown, such as an arm's palm or the head of a torso; None if the part moves no link.
 
-    Among the markers that the part moves, the one is chosen that the fewest motors of other parts move; among equals, the one that the most
-    motors move. If the part moves no marker, the link is chosen in the same manner.
+    It is a marker (named point of a link) that the part moves: the one that depends on the fewest motors of other parts; of several such
+    markers, the one that depends on the most motors. If the part moves no marker, a link is chosen by the same rule.
     """
 
     def rank(link: int) -> tuple[int, int]:

@@ -67,8 +67,8 @@ def surprise_sentence(seen: Transition) -> str:
 def wants_sentence(decision: Decision, untried: Sequence[int], actions: Sequence[int]) -> str:
     """Describe where the agent's plan leads and why.
 
-    `untried`, `actions`: for each state, the number of its actions that were never tried, and of all its actions. The text is empty if
-    these numbers are not known for the last state of the plan.
+    `untried`: for each state, how many of its actions were never tried. `actions`: for each state, the number of all its actions. The text
+    is empty if these numbers are not known for the last state of the plan.
     """
     if decision.explorer in WITHOUT_PLAN:
         return f"nothing in particular: {WITHOUT_PLAN[decision.explorer]}."

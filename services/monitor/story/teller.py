@@ -73,7 +73,7 @@ class Teller:
 
     @property
     def parts(self) -> list[str]:
-        """The parts about which something was received: from an agent, or about a reach."""
+        """The parts for which a message of their agent, or about a reach, has arrived."""
         return [part for part in self._colors if part in self._agents]
 
     def forget_run(self) -> None:
@@ -81,7 +81,7 @@ class Teller:
         for agent in self._agents.values():
             agent.decision = agent.reach = None
         self._playback = None
-        self.changed |= {"cards", "path"}
+        self.changed |= {"cards", "left", "path"}
 
     def note_decision(self, seen: Decision) -> None:
         """Store the action that an agent has decided on, and now begins."""
@@ -98,6 +98,7 @@ class Teller:
             agent.last = seen
             if agent.decision is not None and agent.decision.n < seen.n:  # else it is the next one, which arrived before this outcome
                 agent.decision = None
+                self.changed.add("left")
             agent.recent.append((surprise_of(seen.probability), seen.s_next == seen.goal))
             self.changed.add("cards")
 

@@ -50,8 +50,7 @@ class Plots:
     def log_forces(self, forces: Forces) -> None:
         """Log the norm of each force term over all motors of the robot [rad/s^2].
 
-        Model and controller each send some of the terms. With a message of one sender, the newest norms of the other's terms are logged
-        again.
+        Model and controller each send some of the terms. Every call logs all terms: those in `forces`, and the newest norms of the others.
         """
         known = len(self._strengths)
         self._strengths |= {name: float(np.linalg.norm(row)) for name, row in forces.terms.items()}
@@ -60,7 +59,7 @@ class Plots:
         self._stream.log("plots/forces", rr.Scalars(list(self._strengths.values())))
 
     def log_transition(self, part: str, seen: Transition) -> None:
-        """Log the reward [nats], the value and the number of a transition; nothing for a part without a plot."""
+        """Log a transition's reward [nats], value, and index in the agent's sequence; nothing for a part without a plot."""
         if part not in self._parts:
             return
         for quantity, value in zip(LEARNED, (seen.reward, seen.value, float(seen.n)), strict=True):

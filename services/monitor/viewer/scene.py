@@ -162,7 +162,7 @@ SHOULDERS = {"left_arm": "l_shoulder_pitch", "right_arm": "r_shoulder_pitch"}
 
 
 class Poses:
-    """Logs the last 600 arm poses in which actions ended to a Rerun stream: thin lines from shoulder to elbow to palm."""
+    """Draws the last 600 arm poses in which an action ended, as thin lines from shoulder to elbow to palm, in a Rerun stream."""
 
     def __init__(self, stream: rr.RecordingStream | Frames, robot: Robot) -> None:
         self._stream, self._robot = stream, robot

@@ -60,7 +60,7 @@ def _fewer(vertices: Array) -> Array:
 def body_at(robot: Robot, q: Array, contacts: list[ContactItem]) -> dict[str, Any]:
     """Return the robot in the pose `q` (n,) rad as JSON data.
 
-    "links": (L, 12), for each link the rows of [R | p], root frame, m. "contacts": as of `contacts_of`.
+    "links": (L, 12), for each link the rows of [R | p], root frame, m. "contacts": as returned by `contacts_of`.
     """
     transforms = link_transforms(robot, q)
     return {
@@ -70,7 +70,7 @@ def body_at(robot: Robot, q: Array, contacts: list[ContactItem]) -> dict[str, An
 
 
 def contacts_of(contacts: list[ContactItem]) -> list[dict[str, Any]]:
-    """Return contacts as JSON data: for each "kind", the names of the two shapes ("first", "second"), and "point" (3,) m, root frame."""
+    """Return a list of dicts, one per contact: "kind", names of the two shapes ("first", "second"), and "point" (3,) m, root frame."""
     return [{"kind": c.kind, "first": c.first, "second": c.second, "point": _rounded(np.array(c.point))} for c in contacts]
 
 

@@ -25,7 +25,7 @@ LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 NEWS_PATIENCE = 5.0  # s that a request for news waits
 FRAME_PATIENCE = 2.0  # s that a request for the 3D view waits
 GONE = 6.0  # s without a request after which a page counts as closed
-LARGEST_CALL = 20_000  # bytes
+LARGEST_CALL, MOST_DIGITS = 20_000, 10  # bytes; of a length
 NAMED = ("127.0.0.1", "localhost")  # under one name the page is served, under the other the viewer that it embeds
 POLICY = (
     "default-src 'self'; connect-src 'self'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self' 'unsafe-inline'; "
@@ -102,8 +102,8 @@ class Site:
     `board`: values of the page. `key`: secret word in the page's address; without it a page shows everything but cannot send commands.
     `controls`: executes commands. `frames`: data of the 3D view; None: no live 3D view. `viewer_file`: returns the path of a file of
     Rerun's viewer, by name; None: no viewer. `time`: returns the robot's time [s]. `others`: further files, by the name under which they
-    are served. `seek`: for a replay, moves in time by the query of the address. `surfaces`: returns the robot as triangles, encoded as by
-    `services.monitor.web.surfaces.encoded`. `pages`: the open pages.
+    are served. `seek`: executes a command of a replay's time line, given as query of a request; None: no replay. `surfaces`: returns the
+    robot as triangles, encoded as by `services.monitor.web.surfaces.encoded`. `pages`: the open pages.
     """
 
     board: Board
@@ -202,15 +202,20 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_POST(self) -> None:
         """Do what a page with the key asks for."""
-        length = int(self.headers.get("Content-Length") or 0)
         if not self._is_local() or not self._is_from_the_page():
             return
+        given = self.headers.get("Content-Length") or "0"
+        if not (given.isascii() and given.isdigit()):  # int() also takes signs, blanks and underscores
+            self.close_connection = True
+            self._answer(HTTPStatus.BAD_REQUEST, False, "the request has no valid length")
+            return
+        length = int(given) if len(given) < MOST_DIGITS else LARGEST_CALL + 1
         if length > LARGEST_CALL:
             self.close_connection = True
             self._answer(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, False, "the request is too long")
             return
         body = self.rfile.read(length)
-        if not hmac.compare_digest(self.headers.get("X-Key", ""), self._site.key):
+        if not hmac.compare_digest(self.headers.get("X-Key", "").encode(), self._site.key.encode()):
             self._answer(HTTPStatus.FORBIDDEN, False, "this page can only show: open the address that the launcher prints, with its key")
             return
         try:

@@ -91,7 +91,7 @@ Made = tuple[Array, Array, Ints]  # vertices, normals, triangles, in the frame o
 def flat(corners: Array) -> Made:
     """Return triangles with flat shading as vertices (3 t, 3), normals (3 t, 3) and indices (t, 3).
 
-    `corners`: (t, 3, 3) m. Triangles share no vertices.
+    `corners`: (t, 3, 3) m: t triangles, their three corners, and x, y, z. Triangles share no vertices.
     """
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)

@@ -197,8 +197,11 @@ def test_a_decision_that_arrives_before_the_outcome_of_the_one_before_stays() ->
             teller.note_transition(arrived)
         else:
             teller.note_decision(arrived)
-        (card,) = teller.values()["cards"]
+        values = teller.values()
+        (card,) = values["cards"]
         assert ("now" in card) == shown
+        if not shown and isinstance(arrived, Transition) and arrived.n == 8:
+            assert not values["left"]["left_arm"].get("path")
 
 
 def test_an_agent_of_another_robot_has_a_story_too(tmp_path: Path) -> None:

@@ -89,6 +89,21 @@ def test_a_refusal_and_an_invalid_call_are_said(served: tuple[PageServer, Asked]
     assert ask(served[0], "GET", "/news?after=many")[0] == 400
 
 
+@pytest.mark.parametrize(
+    ("headers", "status"),
+    [
+        ({"X_Key": "s\u00e9cret"}, 403),
+        ({"Content_Length": "many"}, 400),
+        ({"Content_Length": "-1"}, 400),
+        ({"Content_Length": "9" * 5000}, 413),
+    ],
+)
+def test_headers_that_no_page_sends_are_refused(served: tuple[PageServer, Asked], headers: dict[str, str], status: int) -> None:
+    server, controls = served
+    assert ask(server, "POST", "/do", CALL, **{"X_Key": "secret"} | headers)[0] == status
+    assert controls.calls == []
+
+
 def test_a_reader_gets_what_changed_and_skips_what_it_missed() -> None:
     board = Board()
     board.put("body", 1)
