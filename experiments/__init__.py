@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The experiments that test published claims: each module of `claims` states claims, sources and published numbers, and has the run."""
+"""The experiments that test published claims: each module of `claims` states claims, sources and published numbers, and runs the test."""

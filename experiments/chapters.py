@@ -40,8 +40,9 @@ def chapter_of(claim: Claim) -> int:
 def section(table: Sequence[tuple[str, Claim]], untested: Callable[[str, str], str]) -> str:
     """Return the published claims as Markdown: a section for each chapter of the thesis, with the claims grouped by verdict.
 
-    `table`: name of the experiment and claim, for each claim; our own aims are left out.  `untested`: function of an experiment's name and
-    a claim's text that returns what the publications leave open and no run varied ("" if there is nothing).
+    `table`: pairs of an experiment's name and one of its claims; claims that are aims of our own, not published, are left out.  `untested`:
+    function that takes the name of an experiment and the text of a claim, and returns what the publications leave open and no run varied,
+    as text ("" if there is nothing).
     """
     published = [(name, claim) for name, claim in table if not claim.is_aim]
     lines = list[str]()

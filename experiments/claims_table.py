@@ -88,21 +88,25 @@ intervals include noise, starts and random choices, but not the draw of the grap
 
 
 def stated() -> Rows:
-    """Return the name of the experiment and the claim, without measured numbers, for all claims; those of chapter 7 come first."""
+    """Return all claims without measured numbers, as pairs of the experiment's name and the claim; those of chapter 7 come first."""
     names = dict.fromkeys((*CHAPTER7, *BEYOND, *EXPERIMENTS))
     return [(name, claim) for name in names for claim in load_experiment(name).claims]
 
 
 def recorded() -> Recorded:
-    """Return the record in claims.json, from which the page was last written: entries by the experiment's name; empty without the file."""
+    """Return the content of claims.json, from which the page was last written: table entries by the experiment's name; {} without the file.
+
+    An entry has the measured claims, the number of seeds and the commit of a run.
+    """
     return {current_name(name): entry for name, entry in read(RECORD).items()} if RECORD.exists() else {}
 
 
 def rows(record: Mapping[str, Mapping[str, Any]], confirms: bool = False) -> Rows:
-    """Return the name of the experiment and the claim, for all claims, with the recorded numbers and verdicts as far as there are any.
+    """Return all claims as pairs of the experiment's name and the claim, with the recorded numbers and verdicts as far as there are any.
 
-    `record`: the table's entries, by the experiment's name.  `confirms`: take the entries of the runs with new seeds instead of those of
-    the first runs.  A claim becomes open if its p value is too large among those of all claims, as decided by `largest_rate`.
+    `record`: the table's entries, by the experiment's name.  `confirms`: take the numbers of the later runs with new seeds, which confirm
+    the first runs, instead of those of the first runs.  A claim becomes open if its p value is too large among those of all claims, as
+    decided by `largest_rate`.
     """
     entries = {name: entry.get(CONFIRMED, {}) if confirms else entry for name, entry in record.items()}
     measured = {(name, c["source"], c["text"]): Claim(**c) for name, entry in entries.items() for c in entry.get("claims", ())}
@@ -115,7 +119,7 @@ def rows(record: Mapping[str, Mapping[str, Any]], confirms: bool = False) -> Row
 def largest_rate(p: Sequence[float]) -> float:
     """Return the largest p value with which a decision still counts, by the procedure of Benjamini and Hochberg (1995); 0 if none counts.
 
-    `p`: the p values of all decisions.  Of the decisions that count, the share FALSE_DISCOVERIES (0.05) at most is expected to be wrong.
+    `p`: the p values of all decisions.  At most the share FALSE_DISCOVERIES (0.05) of the decisions that count is expected to be wrong.
     """
     ordered = sorted(p)
     allowed = [FALSE_DISCOVERIES * rank / len(ordered) for rank in range(1, len(ordered) + 1)]
@@ -125,7 +129,8 @@ def largest_rate(p: Sequence[float]) -> float:
 class Finished(NamedTuple):
     """A finished run.
 
-    `entry`: its entry in the table of claims.  `run`: its folder.  `versions`: path of the file with the versions of the software.
+    `entry`: its entry in the table of claims: measured claims, number of seeds, commit.  `run`: its folder.  `versions`: path of the file
+    with the versions of the software.
     """
 
     entry: Entry
@@ -137,7 +142,8 @@ def runs_in(folders: Sequence[Path]) -> dict[str, Finished]:
     """Return a dict from the name of each experiment in these folders to its finished run; runs whose results have no claims are ignored.
 
     A folder is that of an experiment's run, or that of a chapter's run, which has a folder for each experiment.  Of several runs of one
-    experiment, the one with the most seeds is returned, of equal ones the last.  Raises InvalidValue for a folder without results.
+    experiment, the one with the most seeds is returned; if several have the most seeds, the last of them.  Raises InvalidValue for a folder
+    without results.
     """
     found: dict[str, Finished] = {}
     for name, run, versions in _finished_in(folders):
@@ -189,13 +195,19 @@ def better(before: Recorded, after: Recorded) -> Recorded:
 
 
 def replaced(before: Recorded, after: Recorded) -> Recorded:
-    """Return the record `before` with the entries of `after` in place of its own; its entries of runs with new seeds are kept."""
+    """Return the record `before` with the entries of `after` in place of those with the same names.
+
+    The part "confirmed" of an entry, which is of a run with new seeds, is kept from `before`.
+    """
     kept = {name: {CONFIRMED: entry[CONFIRMED]} for name, entry in before.items() if CONFIRMED in entry}
     return before | {name: kept.get(name, {}) | entry for name, entry in after.items()}
 
 
 def with_confirmed(record: Recorded, found: Recorded) -> Recorded:
-    """Return the record with the entries `found` of runs with new seeds: each is stored in the experiment's entry, under "confirmed"."""
+    """Return the record with the entries `found` of confirming runs, which have new seeds.
+
+    Each one is stored in the entry of its experiment, under the key "confirmed".
+    """
     return record | {name: {**record.get(name, {"seeds": None, "commit": None, "claims": []}), CONFIRMED: found[name]} for name in found}
 
 
@@ -230,7 +242,7 @@ def require_seeds(folders: Sequence[Path], confirms: bool) -> None:
 
 
 def keep_records(found: Mapping[str, Finished], record: Recorded, confirms: bool = False) -> list[str]:
-    """Write the raw records of runs into experiments/records, if the numbers of the run are those of the table.
+    """Write the raw records (archives of the values of all seeds) of those runs whose numbers are in the table into experiments/records.
 
     `found`: the runs by the experiment's name.  `record`: the table's entries.  `confirms`: whether the runs have new seeds.  Returns a
     message for each run whose raw record is too large; the raw records of the others are written.  Raises InvalidValue for a run with new
@@ -252,19 +264,19 @@ def keep_records(found: Mapping[str, Finished], record: Recorded, confirms: bool
 
 
 def recomputed(name: str, confirms: bool = False) -> Entry:
-    """Return the table entry of an experiment, computed from its raw record; raises InvalidValue if there is no raw record.
+    """Return the table entry of an experiment, computed from its raw record, the archive of a run; raises InvalidValue if there is none.
 
-    `confirms`: use the raw record of the run with new seeds.
+    `confirms`: use the raw record of the later run with new seeds, which confirms the first run.
     """
     with opened_record(name, confirms) as run:
         return _entry(name, run, run / VERSIONS)
 
 
 def differences(name: str, entry: Mapping[str, Any], confirms: bool = False) -> list[str]:
-    """Compare the table entry of an experiment with its raw record; returns a line of text for each difference.
+    """Compare the table entry of an experiment with its raw record (the archive of the run); returns a line of text for each difference.
 
-    Without a raw record, each claim of the entry that is not open is a difference.  `confirms`: use the raw record of the run with new
-    seeds.
+    Without a raw record, each claim of the entry that is not open is a difference.  `confirms`: use the raw record of the later run with
+    new seeds, which confirms the first run.
     """
     label = f"{name}, new seeds" if confirms else name
     if not record_path(name, confirms).exists():
@@ -284,7 +296,7 @@ def differences(name: str, entry: Mapping[str, Any], confirms: bool = False) -> 
 
 
 def all_differences(record: Recorded) -> list[str]:
-    """Compare the entries of the table with all raw records; returns a line of text for each difference.
+    """Compare the entries of the table with the raw records (archives of the runs); returns a line of text for each difference.
 
     A raw record without an entry in the table is a difference, too.
     """
@@ -295,9 +307,10 @@ def all_differences(record: Recorded) -> list[str]:
 
 
 def write_page(record: Recorded) -> None:
-    """Write the record to claims.json, the page to experiments/README.md, and the chapters into docs/results.md.
+    """Write the record to claims.json, the table to experiments/README.md, and the claims by chapter of the thesis into docs/results.md.
 
-    The claims of an experiment without a raw record become open.  Raises InvalidValue outside a clone of the repository.
+    The claims of an experiment without a raw record (the archive of its run) become open.  Raises InvalidValue outside a clone of the
+    repository.
     """
     if not chapters.PAGE.exists():
         raise InvalidValue(f"there is no {chapters.PAGE}: the table is written in a clone of the repository.")
@@ -316,7 +329,7 @@ def _recorded_only(name: str, entry: Entry) -> Entry:
 def page(record: Recorded) -> str:
     """Return the text of experiments/README.md as Markdown: the claims of the thesis and the paper, then our own aims.
 
-    `record`: the table's entries, by the experiment's name.
+    `record`: the entries of the table of claims, by the experiment's name.
     """
     table, confirming = rows(record), dict(_keyed(rows(record, confirms=True)))
     lines = [_HEAD]

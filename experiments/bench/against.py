@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compares the processor time of the same work in two checkouts of this repository.
 
-A case is measured in rounds.  In each round every checkout runs in a fresh process.  Both prepare the case and do its work once without
-timing; then they do it by turns (old, new, new, old, ...).  Only processor time is counted, so other programs on the machine matter little.
-The ratio of a round is the sum of the old times over the sum of the new times.  The verdict rests on the median ratio of the rounds.
+A case is a piece of work with a name, in against_cases.py.  It is measured in rounds.  In each round every checkout runs in a fresh
+process.  Both prepare the case and do its work once without timing; then they do it by turns (old, new, new, old, ...).  Only processor
+time is counted, so other programs on the machine matter little.  The ratio of a round is the sum of the old times over the sum of the new
+times.  The verdict rests on the median ratio of the rounds.
 """
 
 from __future__ import annotations
@@ -129,8 +130,8 @@ class Worker:
 def checkout(folder_or_commit: str, python: str = sys.executable) -> Iterator[Checkout]:
     """Yield the checkout of a folder, or of a commit of this repository.
 
-    A commit is checked out into a temporary folder, which is removed at the end.  Raises AgainstFailed if git is missing or the commit does
-    not exist.
+    A context manager: a commit is checked out into a temporary folder, which is removed at the end.  `python`: the Python interpreter that
+    runs the checkout.  Raises AgainstFailed if git is missing or the commit does not exist.
     """
     if folder_or_commit and Path(folder_or_commit).is_dir():
         yield Checkout(Path(folder_or_commit).resolve(), python)
@@ -165,9 +166,9 @@ def _git(*words: str) -> None:
 def measure(settings: Settings) -> dict[str, Any]:
     """Run this benchmark and return its result; raises AgainstFailed if a checkout cannot be measured.
 
-    If a checkout is given as a commit, its native core is built first.  Main keys: "cases", a dict from the name of each case to the dict
-    of `compared`, with the times of both checkouts and their ratio; "requirements", a list with the dict that `Requirement.judge` returns
-    for each requirement; "passed", whether all are met.
+    If a checkout is given as a commit, its native core is built first.  Main keys: "cases", a dict from the name of each case to the times
+    of both checkouts and their ratio, as `compared` returns them; "requirements", a list with the dict that `Requirement.judge` returns for
+    each requirement; "passed", whether all are met.
     """
     with checkout(settings.old, settings.old_python) as old, checkout(settings.new) as new:
         for given, one in ((settings.old, old), (settings.new, new)):
@@ -179,9 +180,9 @@ def measure(settings: Settings) -> dict[str, Any]:
 def measure_checkouts(old: Checkout, new: Checkout, cases: Sequence[str], rounds: int) -> dict[str, Any]:
     """Measure the cases in two checkouts by turns and return the result; raises AgainstFailed.
 
-    `cases`: names in `against_cases.CASES`.  Keys: "rounds", their number; "cases", for each case the times of both checkouts and their
-    ratio, as `compared` returns them; "requirements", a list with the dict that `Requirement.judge` returns for each requirement, for each
-    case that the new checkout is not slower than the old one; "passed", whether all are met.
+    `cases`: names in `against_cases.CASES`.  Keys: "rounds", their number; "cases", a dict from the name of each case to the times of both
+    checkouts and their ratio, as `compared` returns them; "requirements", a list with a dict for each case, as `Requirement.judge` returns
+    it: the new checkout must not be slower than the old one (ratio at least 0.97); "passed", whether all are met.
     """
     pairs: dict[str, list[Pair]] = {case: [] for case in cases}
     with Progress() as progress:
@@ -212,8 +213,9 @@ def _round(old: Checkout, new: Checkout, case: str, turns: int) -> Pair:
 def compared(rounds: Sequence[Pair]) -> dict[str, Any]:
     """Return the statistics of one case over its rounds.
 
-    Keys: "old_s" and "new_s", median times [s]; "ratio", the median of old over new; its "quartiles" and "range", each two numbers; "work",
-    counts of the work of each checkout in the last round; "same_work", whether these counts are equal.
+    `rounds`: for each round, under "old" and "new", the "seconds" of the work [s] and "work", counts of the work done.  Keys: "old_s" and
+    "new_s", median times [s]; "ratio", the median of the old time over the new one; "quartiles" and "range" of this ratio, two numbers
+    each; "work", counts of the work of each checkout in the last round; "same_work", whether these counts are equal.
     """
     old, new = (np.array([one[which]["seconds"] for one in rounds]) for which in ("old", "new"))
     ratios = old / new

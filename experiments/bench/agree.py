@@ -37,7 +37,8 @@ Observed = Mapping[str, Sequence[Transition]]  # of each part
 class Settings:
     """Settings of the benchmark.
 
-    `actions`: about how many actions of all agents are compared.  `seed`: seed of the agents and of the encoder noise.
+    `actions`: approximate number of actions that are compared, of all agents together.  `seed`: seed of the agents and of the encoder
+    noise.
     """
 
     actions: int = 100
@@ -67,8 +68,8 @@ class Agreement:
 def lockstep(ticks: int, seed: int, folder: Path) -> tuple[dict[str, list[Transition]], dict[str, Any]]:
     """Run three live agents in lockstep (every tick waits for all participants) for `ticks` ticks.
 
-    Returns a dict from the name of a part to its transitions, and the summary of the run.  The files of the run are in a new folder in
-    `folder`.  `seed`: of the run.
+    Returns the transitions of each part, by its name, and the launcher's summary of the run.  The files of the run are in a new folder in
+    `folder`.  `seed`: seed of the agents and of the encoder noise.
     """
     summary = summary_of("lockstep", [f"shared.seed={seed}", PATIENCE], ticks=ticks, runs=folder)
     file = Path(summary["run"]) / "transitions.sqlite"
@@ -94,7 +95,7 @@ def offline(actions: int, seed: int, folder: Path) -> dict[str, list[Transition]
 
 
 def compare(live: Observed, plant: Observed) -> Agreement:
-    """Compare the actions of a live and an offline run, in order; of each part, only as many as occur in both runs.
+    """Compare the actions of a live and an offline run: for each part in order of time, as far as both runs have actions.
 
     `live`, `plant`: the transitions of both runs, by the name of the part.
     """

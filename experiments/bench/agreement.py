@@ -4,7 +4,7 @@
 If two volumes overlap by less than MIN_OVERLAP, two programs may differ on whether they touch.  A depth is *right* if it is the distance
 that the first volume must move along the normal until a plane separates the two.  It is *minimal* if no peer gives a direction in which a
 shorter motion separates the volumes.  `separation` computes this distance for any direction.  Therefore a peer can be used even if its own
-depths are not minimal, as with MuJoCo's contact points and with the iterative searches of coal and fcl for cylinders.
+depths are not minimal, as those of MuJoCo's contact points, and those that coal and fcl find for cylinders by iterative searches.
 """
 
 from __future__ import annotations
@@ -45,8 +45,9 @@ class Agreement:
     `contacts`: number of the model's contacts.  `other_pairs`: number of contacts that only one of the two programs finds; `deepest_other`:
     depth of the deepest such contact [m], 0 if there is none.  `depth_difference`: largest difference between the depths of both programs
     [m], by kinds of volumes ("box-capsule").  `same_depths`: share of the contacts whose depths differ by at most DEPTH_TOLERANCE (1e-9 m).
-    `beaten`: how much [m] the volumes of a contact can be separated by a shorter motion than the model's depth, if they move along the
-    peer's normal: the largest difference, 0 if there is none; the model's depth should be the minimum.
+    `beaten`: the model's depth of a contact should be the shortest motion that separates the two volumes; if the motion along the peer's
+    normal is shorter for some contacts, the largest difference of the two [m], else 0.  `passed`: whether all differences are within their
+    tolerances.
     """
 
     peer: str
@@ -117,7 +118,7 @@ class ModelContacts:
 def agreements(scene: Scene, with_coal: bool) -> tuple[list[Agreement], float]:
     """Compare the model with MuJoCo, python-fcl and, if `with_coal`, coal.
 
-    Returns a comparison for each peer, and the model's largest depth error [m], as of `ModelContacts.depth_error`.
+    Returns a comparison for each peer, and the model's largest depth error [m], as `ModelContacts.depth_error` returns it.
     """
     ours = ModelContacts(scene)
     peers: dict[str, Detect] = {"MuJoCo": _mujoco(scene), "python-fcl": _fcl(scene)}
@@ -130,8 +131,8 @@ def compared(peer: str, scene: Scene, ours: ModelContacts, detect: Detect) -> Ag
     """Compare the contacts `ours` of the model with those of the peer.
 
     `detect`: function that takes the index of a pose and returns the peer's contacts: pairs (c, 2) of indices in `ours.volumes`, depths
-    (c,) m, and unit vectors (c, 3), root frame, along which the first volume moves out of the second.  Depths that the peer does not
-    compute are not compared.
+    (c,) m, and unit vectors (c, 3), root frame, along which the first volume moves out of the second.  The depth of a contact is not
+    compared if the peer does not compute it.
     """
     other: list[float] = []
     differences: dict[str, list[float]] = defaultdict(list)

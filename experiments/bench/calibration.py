@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The calibration loop: fixed work without MoBeE, which measures the speed of a machine where no peer can be timed beside MoBeE.
+"""The calibration loop: fixed work without MoBeE that measures the speed of a machine, for benchmarks without a program to compare with.
 
 It consists of three parts of equal time: Python (calls, a dictionary, floating point numbers), NumPy with arrays of a few numbers, and
 NumPy with arrays of thousands, as in most numerical programs.  The *standard machine* does the loop in STANDARD_SECONDS.  A time that is
@@ -147,16 +147,16 @@ class Crew:
         """Return the speed of this machine while all helpers do the calibration loop at the same time.
 
         It is in multiples of the speed of the standard machine, the one for which the requirements were set: STANDARD_SECONDS (0.01 s) over
-        the median wall time of `count` measurements.
+        the median wall time of `count` measurements, in each of which every helper does one loop.
         """
         return STANDARD_SECONDS / self._request(_LOOP, 1, count)
 
     def exchanges(self, count: int = 5) -> float:
         """Return the speed of this machine while processes exchange messages, in multiples of the standard machine's speed.
 
-        The standard machine is the one for which the requirements were set.  All helpers do a portion of the loop for each message and
-        answer; the next message is sent after all answers.  The speed is STANDARD_EXCHANGE_SECONDS (0.016 s) over the median wall time of a
-        loop, of `count` measurements.
+        The standard machine is the one for which the requirements were set.  In a measurement, this process sends 50 messages to all
+        helpers, the next one when all have answered the last; for each message a helper does a portion (1/50) of the calibration loop and
+        answers.  The speed is STANDARD_EXCHANGE_SECONDS (0.016 s) over the median wall time of `count` measurements.
         """
         return STANDARD_EXCHANGE_SECONDS / self._request(_PORTION, PORTIONS, count)
 
@@ -175,11 +175,11 @@ class Crew:
 
 
 def bare_ages(rate: float, seconds: float, helpers: int = 2) -> NDArray[np.int64]:
-    """Measure the delay that the scheduling of this machine costs, with a chain of processes that do nothing but calibration portions.
+    """Measure the delay that the scheduling of this machine causes, with a chain of processes that do nothing but calibration portions.
 
-    At each tick (`rate` [Hz], for `seconds`) this process reads the newest tick number that has passed through the chain and records its
-    age.  Then it does a portion of the loop and sends the number of the tick to the first helper.  Each helper does a portion and sends the
-    number to the next one.
+    At each tick (`rate` [Hz], for `seconds`) this process reads the newest tick number that has passed through the whole chain, and records
+    its age: how many ticks ago it was sent.  Then it does a portion of the calibration loop and sends the number of the tick to the first
+    helper. Each of the `helpers` does a portion and sends the number to the next one, and the last helper sends it back to this process.
 
     Returns the ages [ticks] in all ticks, shape (round(rate * seconds),).
     """

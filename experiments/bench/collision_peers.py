@@ -53,7 +53,7 @@ class FclPairs(_FclScene):
         return len(self._pairs)
 
     def detect(self, transforms: Array) -> int:
-        """Return the number of pairs that touch in one pose.  `transforms`: poses of the links (L, 4, 4), root frame."""
+        """Return the number of pairs of volumes that touch in one pose.  `transforms`: poses of the links (L, 4, 4), root frame."""
         self.place(transforms)
         request, result, collide = self._request, self._result, fcl.collide
         return sum(collide(a, b, request, result) > 0 for a, b in self._pairs)
@@ -78,7 +78,7 @@ class FclTrees(_FclScene):
         self._has_world = bool(self.objects)
 
     def detect(self, transforms: Array) -> int:
-        """Return the number of pairs that touch in one pose.  `transforms`: poses of the links (L, 4, 4), root frame."""
+        """Return the number of pairs of volumes that touch in one pose.  `transforms`: poses of the links (L, 4, 4), root frame."""
         self.place(transforms)
         self._robot.update()
         touching = [0]
@@ -98,7 +98,7 @@ def _fcl_object(volume: Shape | WorldObject) -> Any:
 
 
 class CoalPeer:
-    """A robot and the objects of a world as models of Pinocchio, with the pairs that MoBeE tests; coal detects the contacts.
+    """A robot and the objects of a world as models of Pinocchio, with the pairs of volumes that MoBeE tests; coal detects the contacts.
 
     `pairs` (P, 2): indices of the tested volumes: the robot's shapes come first, then the objects.
     """
@@ -119,8 +119,8 @@ class CoalPeer:
     def touching(self, q: Array) -> tuple[Ints, Array, Array]:
         """Return the contacts in pose q (n,) rad.
 
-        They are given as pairs (c, 2) of volumes, depths (c,) m, and unit vectors (c, 3), root frame, along which the first volume moves
-        out of the second.
+        They are given as pairs (c, 2) of volumes (indices: the robot's shapes come first, then the objects), depths (c,) m, and unit
+        vectors (c, 3), root frame, along which the first volume moves out of the second.
         """
         matrix, offset = self._coupling
         pin = self._pin

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures of the cost of the model, of the plant and of plans for various sizes: `mobee bench model|plant|vi --figure FILE`."""
+"""Figures of the processor time of the model, of the plant and of plans for various sizes: `mobee bench model|plant|vi --figure FILE`."""
 
 from __future__ import annotations
 
@@ -90,8 +90,9 @@ def _measured(points: list[tuple[str, float]]) -> Iterator[Iterator[tuple[str, f
 def model_costs(quick: bool, rounds: int | None = None, poses: int = 500) -> Curves:
     """Measure the cost of evaluating a pose of the model and of its peers, for several numbers of boxes and of primitives.
 
-    Returns {"boxes" or "primitives": {number: {contestant: median processor time [us] per pose}}}.  `poses`: poses per round.  `rounds`:
-    None for 9, or for 3 if `quick`.  Raises NotInstalled without MuJoCo or python-fcl.
+    Returns {"boxes" or "primitives": {number: {contestant: median processor time [us] per pose}}}.  "number" counts the boxes around the
+    robot, or the robot's primitives (collision volumes).  `poses`: poses per round.  `rounds`: None for 9, or for 3 if `quick`.  Raises
+    NotInstalled without MuJoCo or python-fcl.
     """
     rounds = rounds or (3 if quick else 9)
     curves: Curves = {"boxes": {}, "primitives": {}}
@@ -131,8 +132,8 @@ def _counts_axis(axes: Any, counts: tuple[int, ...]) -> None:
 def plant_costs(quick: bool, rounds: int | None = None) -> Curves:
     """Measure the processor time of a plant with one arm, for several lengths of the tick [s] and numbers of objects.
 
-    Returns {"tick" or "objects": {size: {"us_per_tick": ..., "ms_per_second": ...}}}: processor time of a tick [us], and processor time for
-    one second of the plant's time [ms].  `quick`: fewer actions.  `rounds` is not used.
+    Returns {"tick" or "objects": {size: {"us_per_tick": ..., "ms_per_second": ...}}}.  "us_per_tick": processor time of a tick [us].
+    "ms_per_second": processor time for one second of the plant's time [ms].  `quick`: fewer actions.  `rounds` is not used.
     """
     curves: Curves = {"tick": {}, "objects": {}}
     points: list[tuple[str, float]] = [("tick", dt) for dt in TICKS]
@@ -164,7 +165,7 @@ def draw_plant_costs(left: Any, right: Any, curves: Mapping[str, Any]) -> None:
 
 
 def plan_costs(quick: bool, rounds: int | None = None) -> Curves:
-    """Measure the cost of a plan by all solvers, for several numbers of states and discounts.
+    """Measure the processor time of a plan (solving an MDP) with all solvers, for several numbers of states and discounts.
 
     Returns {"states" or "discount": {size: {solver: median processor time [us] per plan}}}.  `rounds` is not used.  Raises NotInstalled
     without quantecon.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Edge checks of a roadmap: the time for the thesis' 400 000 poses, for each edge once, and for the edges near a change (thesis 4.3.3).
+"""Contact checks along the edges of a roadmap: time for the 400 000 poses of thesis 4.3.3, for each edge once, and for edges near a change.
 
 The roadmap is the thesis' pre-grasp map: the right palm above the table, one vertex every few millimetres, 8 neighbours (figure 4.8).
 """
@@ -57,11 +57,11 @@ def palm_map(spacing: float) -> Roadmap:
 def measure(settings: Settings) -> dict[str, Any]:
     """Run this benchmark and return its result.
 
-    Main keys: "vertices" and "edges", numbers of the roadmap; processor times [s] of the methods, medians of the rounds: "plain_s" (pose by
-    pose), "both_s" and "once_s" (each edge in both directions, or once), "change_s" and "all_s" (after an object was added, only the edges
-    near it, or all); "plain_poses", "both_poses" and "once_poses", numbers of checked poses; "agree", whether all methods find the same
-    free edges; "requirements", a list with the dict that `Requirement.judge` returns for each requirement; "passed", whether all are met
-    and the methods agree.
+    Main keys: "vertices" and "edges", their numbers in the roadmap; processor times [s] of the methods, medians of the rounds: "plain_s"
+    (pose by pose), "both_s" and "once_s" (each edge in both directions, or once), "change_s" and "all_s" (after an object was added, only
+    the edges near it, or all); "plain_poses", "both_poses" and "once_poses", numbers of checked poses; "agree", whether all methods find
+    the same edges free of contacts; "requirements", a list with the dict that `Requirement.judge` returns for each requirement; "passed",
+    whether all are met and the methods agree.
     """
     with one_core() as core, Progress() as progress:
         progress.show(0.0, "making the map")

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Nearly valid messages, calls and tokens to a live system (`experiments.kit.live.malformed`): which processes end, and how memory grows.
+"""Nearly valid messages, calls and tokens, sent to a live system by `kit.live.malformed`: which processes end, and how memory grows.
 
 Claim: no process ends, none is ended by the launcher, the memory of each has grown by less than 20 MB when the queues are empty again, and
-afterwards every agent learns.  The robot moves by the motor model at 100 Hz, with its three agents; no monitor runs.  Messages are not
-dropped: a service that does not read fast enough delays the sender.  Run time: some minutes for a million on 2 cores.
+afterwards every agent makes transitions.  The robot moves by the motor model at 100 Hz, with its three agents; no monitor runs.  Messages
+are not dropped: a service that does not read fast enough delays the sender.  Run time: some minutes for a million on 2 cores.
 """
 
 from __future__ import annotations
@@ -56,9 +56,9 @@ def measure(settings: Settings) -> dict[str, Any]:
     """Send all messages, which are nearly valid, and return the result; raises LaunchFailed if the system fails.
 
     Main keys: "sent", dict of the numbers of sent "messages", "calls" and "tokens"; "refused", dict from a process to the number of
-    messages that it refused; "grown_mb" and "largest_growth_mb", dicts from a process to the growth of its memory at the end and at most
-    [MB]; "ended", list of the processes that ended; "learned", list of the agents that made a transition afterwards; "passed", whether no
-    process ended, no memory grew too much, and all agents learned.
+    messages that it refused; "grown_mb" and "largest_growth_mb", dicts from a process to the growth of its memory [MB], at the end and at
+    its largest; "ended", list of the processes that ended; "learned", list of the agents that made a transition afterwards; "passed",
+    whether no process ended, no memory grew too much, and all agents learned.
     """
     sent: Counter[str] = Counter()
     begun = time.monotonic()

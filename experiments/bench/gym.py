@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The Gymnasium environments compared with those of MuJoCo in Gymnasium, in the same rounds: steps per second, alone and 64 in a batch."""
+"""The Gymnasium environments of MoBeE compared with Gymnasium's own MuJoCo environments: steps per second, alone and 64 in a batch."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ QUICK = Settings(steps=100, rounds=2)
 
 
 class Player:
-    """Performs random actions, drawn in advance, in an environment or in a vector of environments."""
+    """Performs random actions, drawn in advance, in a Gymnasium environment or in a vector of environments."""
 
     def __init__(self, env: Any, steps: int) -> None:
         self._env, self._count = env, getattr(env, "num_envs", 1)
@@ -94,8 +94,8 @@ def measure(settings: Settings) -> dict[str, Any]:
 
     Main keys: "steps_per_second", and "standard" for the same rates on the standard machine (the one for which the requirements were set),
     both dicts from the name of an environment to the median of the rounds; "times_humanoid" and "times_reacher", rate of the batch of
-    Reach-v0 over that of the peer; "requirements", a list with the dict that `Requirement.judge` returns for each requirement; "passed",
-    whether all are met.
+    Reach-v0 over that of Gymnasium's Humanoid-v5 and Reacher-v5; "requirements", a list with the dict that `Requirement.judge` returns for
+    each requirement; "passed", whether all are met.
     """
     playing, speeds = players(settings.steps), Calibration()
     found: dict[str, list[float]] = {name: [] for name in playing}

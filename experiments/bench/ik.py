@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Inverse kinematics: how often and how fast solvers find a pose for a palm among boxes; the library's, mink and the thesis' rivals."""
+"""Inverse kinematics: how often and how fast solvers bring the palm among boxes to a target: the library's, mink and the thesis' rivals."""
 
 from __future__ import annotations
 
@@ -70,9 +70,9 @@ QUICK = Settings(targets=20, whole=5, rivals=5)
 def measure(settings: Settings) -> dict[str, Any]:
     """Run this benchmark and return its result; raises NotInstalled without cma, mink or MuJoCo.
 
-    Main keys: "rows", a dict from the name of a solver to its statistics, as `Tries.row` returns them, with "times_cma", the time of CMA-ES
-    over that of the solver; "requirements", a list with the dict that `Requirement.judge` returns for each requirement; "passed", whether
-    all are met.
+    Main keys: "rows", a dict from the name of a solver to its statistics, as `Tries.row` returns them, with "times_cma", the median time of
+    CMA-ES (pose by pose) over that of the solver; "requirements", a list with the dict that `Requirement.judge` returns for each
+    requirement; "passed", whether all are met.
     """
     load_cma()
     load_mink()
@@ -137,7 +137,7 @@ def scene() -> mobee.Model:
 
 
 def targets(model: mobee.Model, count: int, seed: int = 0) -> list[Target]:
-    """Return `count` poses of the palm that can be reached: those in random postures of torso and arm without a contact.
+    """Return `count` target poses of the palm that can be reached: its poses in random postures of torso and arm without a contact.
 
     `seed`: of the postures.
     """
@@ -255,8 +255,8 @@ class Entrant:
 def solve_by_turns(entrants: Mapping[str, Entrant], speeds: Calibration, show: Callable[[int, str], None]) -> dict[str, Tries]:
     """Solve all targets, a few with each solver in turn, so that a slow minute of the machine affects all solvers equally.
 
-    `entrants`: by the name of the solver, as the result.  `speeds` measures the speed of this machine.  `show` is called with the number of
-    targets done and the name of the solver.
+    `entrants`: the solvers with their targets, by the solver's name.  Returns the tries of each solver, by the same names.  `speeds`
+    measures the speed of this machine.  `show` is called with the number of targets done and the name of the solver.
     """
     for one in entrants.values():
         one.solve(one.aims[0], 0)  # fills caches, does lazy set-up

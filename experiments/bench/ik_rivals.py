@@ -69,8 +69,8 @@ class Target:
 def xnes(problem: Problem, seed: int, most: int) -> Array | None:
     """Search for a pose by xNES as published (Glasmachers 2010), with its default population and with the library's limits and restarts.
 
-    Returns a pose (n,) rad within all tolerances, or None after `most` evaluations.  `seed`: of the random numbers.  `most`: largest number
-    of evaluations.
+    Returns a pose (n,) rad within all tolerances, or None after `most` evaluations.  `seed`: of the random numbers.  `problem`: the inverse
+    kinematics problem.  `most`: largest number of evaluations (poses whose cost is computed).
     """
     low, high = problem.limits.T
     start, restart = problem.start[problem.free], Restart(patience=XNES_PATIENCE)
@@ -82,7 +82,8 @@ def cma(problem: Problem, seed: int, most: int, batched: bool) -> Array | None:
     """Search for a pose by CMA-ES with its default population.  It restarts at a random posture whenever its own criteria stop it.
 
     `batched`: the poses of a generation are evaluated in one batch, not one by one.  Returns a pose (n,) rad within all tolerances, or None
-    after `most` evaluations.  `seed`: of the random numbers.  `most`: largest number of evaluations.
+    after `most` evaluations.  `seed`: of the random numbers.  `problem`: the inverse kinematics problem.  `most`: largest number of
+    evaluations (poses whose cost is computed).
     """
     rng = np.random.default_rng(seed)
     start = _units(problem, problem.start[problem.free])
@@ -101,8 +102,8 @@ def annealing(problem: Problem, seed: int, most: int) -> Array | None:
     """Search for a pose by simulated annealing, one pose at a time.
 
     The size of the steps and the temperature decrease together during ANNEALING_PERIOD (4000) poses; then the search restarts at the best
-    pose.  Returns a pose (n,) rad within all tolerances, or None after `most` evaluations.  `seed`: of the random numbers.  `most`: largest
-    number of evaluations.
+    pose.  Returns a pose (n,) rad within all tolerances, or None after `most` evaluations.  `seed`: of the random numbers.  `problem`: the
+    inverse kinematics problem.  `most`: largest number of evaluations (poses whose cost is computed).
     """
     rng = np.random.default_rng(seed)
     best = here = there = _units(problem, problem.start[problem.free])
@@ -134,7 +135,7 @@ def particles(problem: Problem, seed: int, most: int) -> Array | None:
 
     In each generation particles are resampled by their costs, and noise is added.  The noise decreases; when it is small, the search
     restarts with uniform random particles.  Returns a pose (n,) rad within all tolerances, or None after `most` evaluations.  `seed`: of
-    the random numbers.  `most`: largest number of evaluations.
+    the random numbers.  `problem`: the inverse kinematics problem.  `most`: largest number of evaluations (poses whose cost is computed).
     """
     rng = np.random.default_rng(seed)
     noise, places = 0.0, rng.uniform(size=(PARTICLES, len(problem.free)))
@@ -184,7 +185,7 @@ def load_mink() -> Any:
 class MinkPeer:
     """The chain of joints from the base to the right palm as a model for mink, without collision volumes.
 
-    Contacts are tested by the problem, in the poses that mink finds.
+    The `Problem` given to `solve` tests the poses that mink finds for contacts.
     """
 
     def __init__(self, robot: Robot) -> None:

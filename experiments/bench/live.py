@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The live system in real time: jitter of the controller's period and age of the command in force, at several rates.
+"""The live system in real time: jitter of the controller's period, and age of the command that the robot obeys, at several rates.
 
-Claim: on two cores the age is at most 2 ticks in 99 of 100 ticks up to 200 Hz, 3 up to 500 Hz and 5 at 1 kHz.  Age and jitter are measured
-by the services; ticks in which a part holds are counted separately and have no age.  Before and after every run, a bare chain of processes
-that do a little each (calibration.py) measures the delay that the machine's scheduling causes.  If this delay is k times that of the
-standard machine, the allowed ages are k times larger.  Run time: `seconds` and a start for every rate, on a machine that does nothing else.
+Claim: on two cores the age is at most 2 ticks in 99 of 100 ticks up to 200 Hz, 3 up to 500 Hz and 5 at 1 kHz.  The age is the number of
+ticks since the tick that the command answers.  Age and jitter are measured by the services; ticks in which a part holds are counted
+separately and have no age.  Before and after every run, a bare chain of processes that do a little each (calibration.py) measures the delay
+that the machine's scheduling causes.  If this delay is k times that of the standard machine, the allowed ages are k times larger.  Run
+time: `seconds` and a start for every rate, on a machine that does nothing else.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The live system in lockstep: how much faster than real time it runs, on the motor model alone, on PyBullet and on MuJoCo.
+"""The live system in lockstep, in which ticks wait for all services: its speed on the motor model, on PyBullet and on MuJoCo.
 
 Claim: robot_sim, model, controller and three agents, each a process, simulate at least 15 s of robot time per second on the motor model and
 10 on PyBullet, at ticks of 20 ms, on the standard machine.  Before and after every run the speed of this machine is measured by processes
@@ -81,7 +81,7 @@ def judged_run(case: Case, summary: Mapping[str, Any], speed: float) -> dict[str
     which the requirements were set).
 
     Keys: the fields of `Case`; "speed", in multiples of real time; "standard_speed", the same on the standard machine; "ticks_per_second";
-    "ticks" and "transitions" (of all agents), numbers; "repeatable", whether the summary says that the run can be repeated exactly;
+    "ticks" and "transitions" (of all agents), their numbers; "repeatable", whether the summary says that the run can be repeated exactly;
     "passed", whether it is repeatable and has at least the required speed.
     """
     lockstep, agents = summary["lockstep"], summary["agents"]

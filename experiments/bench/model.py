@@ -55,8 +55,9 @@ Rates = dict[str, Array]
 class Settings:
     """Sizes and repetitions of the measurements.
 
-    `boxes`: numbers of boxes around the iCub.  `rounds`: repetitions.  `poses`: poses in a round.  `other_poses`: the same for robots of
-    other makers.  `compared_boxes` and `compared_poses`: numbers of boxes, and poses, for the comparison of the contacts.
+    `boxes`: how many boxes are around the iCub; each number is measured.  `rounds`: repetitions.  `poses`: poses in a round.
+    `other_poses`: the same for robots of other makers.  `compared_boxes` and `compared_poses`: numbers of boxes, and poses, for the
+    comparison of the contacts.
     """
 
     boxes: tuple[int, ...] = (0, 10, 100, 1000)
@@ -97,7 +98,7 @@ def measure(settings: Settings) -> dict[str, Any]:
 
     Main keys: "workload", and "versions", a dict from a program to its version; "poses_per_second", "times_mujoco" and "times_python_fcl",
     rates of the iCub's model and their ratios to the peers' rates, as dicts; "agreement", a list with the fields of each `Agreement`
-    (comparison of contacts) as a dict; "requirements" and "passed".  `summarized` explains the last ones.
+    (comparison of contacts) as a dict; "requirements" and "passed".  `summarized` explains all keys from "poses_per_second" on.
     """
     load_mujoco()
     robot, with_coal = upper_body(), importlib.util.find_spec("pinocchio") is not None
@@ -135,14 +136,14 @@ def summarized(
 ) -> dict[str, Any]:
     """Return the medians of the rates and of their ratios to the peers' rates, and the verdict.
 
-    `measured`: the rates by robot and number of objects.  `threads`: "gain", wall time of a batch on one thread over that on two, and
-    "processes", how many times as much fixed work two processes do as one; None if they were not measured.  `depth_error`: the model's
-    largest depth error [m].  `compared`: the comparisons of contacts with the peers.
+    `measured`: the rates of all contestants, by the name of the robot and the number of objects around it.  `threads`: "gain", wall time of
+    a batch on one thread over that on two, and "processes", how many times as much fixed work two processes do as one; None if they were
+    not measured.  `depth_error`: the model's largest depth error [m].  `compared`: the comparisons of contacts with the peers.
 
-    Keys: "poses_per_second", "times_mujoco" and "times_python_fcl", each a number by number of objects and contestant, for the iCub;
-    "others", the same tables for each other robot; "requirements", a list with the dict that `Requirement.judge` returns for each
-    requirement; "passed", whether all are met and all comparisons have passed; "threads", "depth_error", and "agreement", the last three
-    arguments.
+    Keys: "poses_per_second", "times_mujoco" and "times_python_fcl", for the iCub: each a dict from the number of objects to a dict from the
+    contestant to the rate or ratio; "others", the same tables for each other robot; "requirements", a list with the dict that
+    `Requirement.judge` returns for each requirement; "passed", whether all are met and all comparisons have passed; "threads",
+    "depth_error", and "agreement", the last three arguments.
     """
 
     def tables(found: Mapping[int, Rates]) -> dict[str, Any]:
@@ -164,7 +165,7 @@ def summarized(
 
 
 def contestants(robot: Robot, boxes: int, poses: int) -> dict[str, Contestant]:
-    """Return a dict from the name to each contestant; all have the same robot, world and poses.
+    """Return the programs to compare (ours, MuJoCo, python-fcl), by name; all have the same robot, world and poses.
 
     `boxes`: number of boxes in the world.  `poses`: number of poses of a run of ours and of MuJoCo; python-fcl does fewer.
     """
@@ -197,7 +198,7 @@ def contestants(robot: Robot, boxes: int, poses: int) -> dict[str, Contestant]:
 
 
 def beside_mujoco(scene: Scene) -> dict[str, Contestant]:
-    """Return three contestants on a scene: our model with all poses in one batch (BATCH), pose by pose (CALL), and MuJoCo (MUJOCO)."""
+    """Return three programs on a scene: our model with all poses in one batch (BATCH) and pose by pose (CALL), and MuJoCo (MUJOCO)."""
     model, rows, poses = Model(scene.robot, scene.world), list(scene.q), len(scene.q)
     mujoco = MujocoPeer(scene.robot, scene.world.objects)
     angles = list(mujoco.joint_angles(scene.q))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MuJoCo as a peer: kinematics and collision detection on the benchmark's scenes, and its stepper on the plant's robot."""
+"""MuJoCo for comparison: kinematics and collision detection on the benchmark's scenes, and the time of its steps on the plant's robot."""
 
 from __future__ import annotations
 
@@ -119,9 +119,10 @@ def _add_servos(mujoco: Any, spec: Any, joints: int, gain: float) -> None:
 
 
 def us_per_tick(plant: OfflinePlant, ticks: int, seed: int = 0) -> float:
-    """Return MuJoCo's processor time [us] for the steps of one control tick, while random velocities are commanded to the joints.
+    """Return the processor time [us] of MuJoCo's steps for one control tick, while random velocities are commanded to the joints.
 
-    `plant`: its robot, world, tick and substeps are used.  `ticks`: number of timed ticks.  `seed`: of the velocities.
+    `plant`: the offline plant whose robot, world, tick and substeps MuJoCo gets.  `ticks`: number of timed ticks.  `seed`: of the
+    velocities.
     """
     alive = np.isin(np.arange(len(plant.robot.motors)), plant.motors.living)
     robot = stiffened(plant.robot, alive, solids=False)

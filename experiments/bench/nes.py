@@ -51,9 +51,9 @@ def measure(settings: Settings) -> dict[str, Any]:
     """Run this benchmark and return its result; raises NotInstalled without cma.
 
     Main keys: "rows", a list with a dict for each "function" and number of "dimensions": the median evaluations of each strategy under its
-    name, its own processor time per evaluation [us] under its name with the ending "_us", and the "ratio" of the evaluations of NES to
-    those of CMA-ES; "ratio", the median of these ratios; "requirements", a list with the dict that `Requirement.judge` returns for each
-    requirement; "passed", whether all are met.
+    name, the processor time of the strategy itself per evaluation [us] under its name with the ending "_us", and the "ratio" of the
+    evaluations of NES to those of CMA-ES; "ratio", the median of these ratios; "requirements", a list with the dict that
+    `Requirement.judge` returns for each requirement; "passed", whether all are met.
     """
     load_cma()
     rows = [(name, d) for d in settings.dimensions for name in FUNCTIONS]

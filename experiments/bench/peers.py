@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Programs of other authors: their import, CMA-ES, settings of coal's searches, and solvers of decision problems."""
+"""Programs of other authors, for comparison: their import, CMA-ES, settings of coal's searches, and solvers of MDPs."""
 
 from __future__ import annotations
 
@@ -16,10 +16,9 @@ from mobee.learning.value_iteration import OutcomeModel
 
 
 def import_peer(module: str, name: str, extra: str = "bench") -> Any:
-    """Import an optional module and return it.
+    """Import the optional module `module` and return it; raises NotInstalled if it is missing.
 
-    `name`: of the package, and `extra`: the extra of MoBeE that installs it, both for the message of NotInstalled, which is raised if it is
-    missing.
+    `name`, `extra`: name of the package, and the extra of MoBeE that installs it, for the message of the error.
     """
     try:
         return importlib.import_module(module)
@@ -98,7 +97,7 @@ def load_quantecon() -> Any:
 
 
 class DecisionProblem:
-    """A decision problem in the form that SciPy and quantecon need: a sparse matrix with a row for each state-action.
+    """A decision problem (MDP) in the form that SciPy and quantecon need: a sparse matrix with a row for each state-action.
 
     It is built before the timing begins.  Every state must have at least one action.  `rewards` (N,) and `following` (N, S) are the rewards
     and the transition probabilities of all N state-actions.  quantecon's policy iteration, which is exact, is not measured: it does not end

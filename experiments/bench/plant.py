@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The offline plant: how fast it is compared with MuJoCo's stepper on the same robot, and the gain of a batch of plants.
+"""The offline plant: how fast it is compared with MuJoCo's stepper on the same robot, and how much faster plants are in a batch.
 
 One arm moves to random states of its lattice, one arm reaches, and three curious agents act at the table, as in the published experiments.
 """
@@ -46,9 +46,9 @@ REQUIREMENTS = (
 class Settings:
     """Sizes and repetitions of the runs.
 
-    `actions`, `reaches` and `transitions`: number in one run of each kind.  `hashed`: number of actions of the trajectory whose hash is
-    computed twice.  `ticks`: number of control ticks for which MuJoCo's steps are timed.  `batched`: number of actions of each plant of a
-    batch.  `rounds`: repetitions; the median counts.
+    `actions`, `reaches` and `transitions`: how many there are in a run of one arm, of one arm that reaches, and of three agents.  `hashed`:
+    number of actions of the trajectory whose hash is computed twice.  `ticks`: number of control ticks for which MuJoCo's steps are timed.
+    `batched`: number of actions of each plant of a batch.  `rounds`: repetitions; the median counts.
     """
 
     actions: int = 1000
@@ -67,9 +67,9 @@ def measure(settings: Settings) -> dict[str, Any]:
     """Run this benchmark and return its result; raises NotInstalled without MuJoCo.
 
     Main keys: "one_arm", "reaching" and "three_agents", each a dict with the median rates of `Pace.numbers` and `Pace.standard`;
-    "mujoco_us_per_tick", and "times_mujoco", MuJoCo's time over ours; "batch", the result of `measure_batch`; "requirements", a list with
-    the dict that `Requirement.judge` returns for each requirement; "same_hash", whether two equal runs made the same trajectory; "passed",
-    whether all requirements are met and the hashes are equal.
+    "mujoco_us_per_tick", MuJoCo's processor time of a tick, and "times_mujoco", this time over ours; "batch", the result of
+    `measure_batch`; "requirements", a list with the dict that `Requirement.judge` returns for each requirement; "same_hash", whether two
+    equal runs made the same trajectory; "passed", whether all requirements are met and the hashes are equal.
     """
     load_mujoco()
     runs: dict[str, Callable[[], Pace]] = {
@@ -241,7 +241,7 @@ def trajectory_hash(actions: int) -> str:
 
 
 class Batch:
-    """Several plants of one robot, each with one arm that moves to random states of the lattice, and each with a world of its own.
+    """Several plants of one robot, each with its own empty world and one arm, which moves to random states of its lattice.
 
     `count`: number of plants.
     """
@@ -255,7 +255,7 @@ class Batch:
         return self._timed(actions, lambda goals: [plant.act("left_arm", goal) for plant, goal in zip(self.plants, goals, strict=True)])
 
     def together(self, actions: int, threads: int = 1) -> Pace:
-        """Measure `actions` actions of each plant, where all plants advance together in one batch.  `threads`: threads of the batch."""
+        """Measure `actions` actions of each plant, where all plants advance together in one batch.  `threads`: number of threads."""
         return self._timed(actions, lambda goals: self._advance(goals, threads))
 
     def _advance(self, goals: Sequence[Any], threads: int) -> None:

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The stopwatch of `mobee play`: from the command to the first curious action that a browser shows, with an empty home folder.
 
-Claim: a robot is curious on the page at most 20 s after the command, 5 s of which are learning offline.  Each start is a command of its
-own, with an empty home and an empty working directory, and headless Chromium opens the page as soon as its address is printed.  The 3D view
-is not loaded: without a graphics card the browser would draw it on the processor.  The time besides the learning is judged in time of the
-standard machine, by the calibration loop in two processes at once.  At the end the system is stopped as by Ctrl-C.  Run time: 25 s per
-robot.
+Claim: the web page shows the first action of a curious agent at most 20 s after the command, 5 s of which are learning offline.  Each start
+is a command of its own, with an empty home and an empty working directory, and headless Chromium opens the page as soon as its address is
+printed.  The 3D view is not loaded: without a graphics card the browser would draw it on the processor.  The time without the learning is
+converted to the time that the standard machine needs, by the calibration loop in two processes at once.  At the end the system is stopped
+as by Ctrl-C.  Run time: 25 s per robot.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def measure(settings: Settings) -> dict[str, Any]:
     Main keys: "starts", a list with a dict for each start: "robot"; "steps", times [s] of the steps until the page shows the first action;
     "standard_s", the time until then as it is on the standard machine; "clean", whether it ended without error; and others;
     "slowest_standard_s", median time of the slowest robot [s] as it is on the standard machine (the one for which the requirements were
-    set); "ends_clean", whether every system ended without error and left no process; "requirements", a list with the dict that
+    set); "ends_clean", whether every system ended without error and left no process behind; "requirements", a list with the dict that
     `Requirement.judge` returns for each requirement; "passed", whether all are met and the ends were clean.
     """
     chromium = find_chromium()

@@ -104,9 +104,9 @@ def upper_body_scene(boxes: int, poses: int) -> Scene:
 
 @dataclass(frozen=True, slots=True)
 class Maker:
-    """A kind of random robot that stands for robots of other makers, and its world.
+    """A kind of random robots, as examples of robots of other makers, and their worlds.
 
-    `kinds`: kinds of the robot's collision volumes, equally many of each.  `around`: kinds of the objects around it.
+    `kinds`: kinds of the collision volumes of a robot, equally many of each.  `around`: kinds of the objects around it.
     """
 
     name: str

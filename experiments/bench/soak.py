@@ -2,10 +2,10 @@
 """A system that runs for hours: memory, open files and threads of its processes, and whether it becomes slower.
 
 Claim: after a warm-up of a tenth of the time no process is started again, the memory of each grows by less than 5 MB, open files and
-threads stay the same, and the last tenth of the ticks takes at most 1.2 times as long as the first one after the warm-up.  The ages of the
-commands that the motors obey have the same distribution in both: their distribution functions differ by at most .05.  Three agents learn on
-the motor model, in lockstep, where a robot hour takes minutes and a command always answers the tick before; or live, with --scenario, in
-real time.  The recorder runs.
+threads stay the same, and the last tenth of the ticks takes at most 1.2 times as long as the first one after the warm-up.  The age of a
+command is the number of ticks since the tick that it answers.  The ages of the commands that the motors obey have the same distribution in
+both tenths: the distribution functions differ by at most .05.  Three agents learn on the motor model, in lockstep, where a robot hour takes
+minutes and a command always answers the tick before; or live, with --scenario, in real time.  The recorder runs.
 """
 
 from __future__ import annotations
@@ -85,9 +85,9 @@ def measure(settings: Settings) -> dict[str, Any]:
     Raises LaunchFailed if the system fails, or if the run is too short to be judged.
 
     Main keys: "processes", a dict from a process to a dict with "grown_mb", the growth of memory [MB], "more_files" and "more_threads", the
-    additional open files and threads; "slower", time of a tick at the end over that at the beginning; "ages", ages of commands [ticks],
-    "first" at the beginning and "last" at the end, and "apart", the difference of both distributions; "restarted", list of the processes
-    that were started again; "passed", whether nothing grew, slowed down or restarted.
+    additional open files and threads; "slower", time of a tick at the end over that at the beginning; "ages", statistics of the ages of
+    commands [ticks] under "first" (at the beginning) and "last" (at the end); "apart", the largest difference of the distribution functions
+    of these ages; "restarted", list of the processes that were started again; "passed", whether nothing grew, slowed down or restarted.
     """
     ticks, end, samples = _Ticks(), settings.hours * 3600.0, list[_Sample]()
     with Progress() as progress, tempfile.TemporaryDirectory() as scratch, running(Path(scratch), settings.scenario) as system:

@@ -48,7 +48,8 @@ _TIMED = (
 class Settings:
     """Settings of the benchmark.
 
-    `rounds`: number of imports of the library.  `systems`: number of starts of the system.  `seconds`: duration of each of its runs [s].
+    `rounds`: number of imports of the library.  `systems`: number of starts of the system.  `seconds`: how long the system runs after each
+    start [s].
     """
 
     rounds: int = 15
@@ -87,9 +88,9 @@ def summarized(rounds: list[dict[str, tuple[float, float]]], systems: list[dict[
     `rounds`: for each round a dict from a program's name to its wall and processor time [s].  `systems`: the measurements of each start of
     the system.
 
-    Keys: "wall_s" and "processor_s", median times [s] by program; "times_numpy", processor time over that of importing NumPy; "system", a
-    dict with the times until it is ready [s] and memory [MiB]; "requirements", a list with the dict that `Requirement.judge` returns for
-    each requirement; "passed", whether all are met.
+    Keys: "wall_s" and "processor_s", median times [s] by program; "times_numpy", processor time over that of importing NumPy, by program;
+    "system", a dict with the times until it is ready [s] and memory [MiB]; "requirements", a list with the dict that `Requirement.judge`
+    returns for each requirement; "passed", whether all are met.
     """
     wall, own = ({name: np.array([one[name][which] for one in rounds]) for name in _PROGRAMS} for which in (0, 1))
     ratios = {name: float(np.median(own[name] / own[NUMPY])) for name in (IMPORT, POSE)}
@@ -131,11 +132,10 @@ def _system(seconds: float, speeds: Calibration) -> dict[str, Any]:
 
 
 def mebibytes(launcher: int) -> dict[str, float]:
-    """Return a dict from the name of a launcher and of each service it has started to its memory [MiB].
+    """Return the memory [MiB] of a launcher and of each service that it has started, by name.
 
-    `launcher`: process id.  The memory is the PSS: memory that n processes share counts 1/n for each.  That of a
-    service includes its standby process, which starts 10 s after the service is ready.  A process that has ended is
-    absent.
+    `launcher`: process id.  The memory is the PSS: memory that n processes share counts 1/n for each.  The memory of a service includes
+    that of its standby process, which starts 10 s after the service is ready.  A process that has ended is absent.
     """
     found: dict[str, float] = {}
     for pid in (launcher, *_children(launcher)):

@@ -3,9 +3,10 @@
 
 Claim: under each flood of `experiments.kit.live.floods`, and with a thousand idle connections, the stop is obeyed within 50 ms in 99 of 100
 cases, and no process ends.  The robot moves by the motor model at 100 Hz, with its three agents; each stop is sent by a new client.  On the
-machine of robot_sim, `mobee estop` and the page write the stop into the record of stops: this time begins before it is written.  From other
-machines a stop can come only by the bus: this time begins when the client is connected.  Both times end with the first state of the head in
-`estop`, by robot_sim's own clock, which is at most a tick later.  Run time: about a minute for each flood.
+machine of robot_sim, `mobee estop` and the web page write the stop into a file, the record of stops: this time begins before it is written.
+From other machines a stop can come only by the bus: this time begins when the client is connected.  Both times end with the first published
+state of the head that says `estop`, at the time of robot_sim's clock in this state, which is at most a tick later.  Run time: about a
+minute for each flood.
 """
 
 from __future__ import annotations

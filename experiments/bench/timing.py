@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Timing for benchmarks: on chosen cores, in processor time, with the contestants in turns."""
+"""Timing for benchmarks: on chosen cores, in processor time, with the compared programs in turns."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ T = TypeVar("T")
 
 @contextlib.contextmanager
 def one_core() -> Iterator[int | None]:
-    """Keep every thread of this process on one core in this context; yields its number, or None if the system cannot do that."""
+    """Keep every thread of this process on one core in this context; yields the core's number, or None if the system cannot do that."""
     with some_cores(1) as cores:
         yield cores[0] if cores else None
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Requirements of benchmarks, the verdict on a result, and the lines that a report prints of both.
+"""Requirements of benchmarks, the verdict on a result, and the lines of a report that state both.
 
 A number that is judged is a ratio, a size or a count, or a time on the standard machine (calibration.py): never a bare time.
 """
@@ -15,8 +15,8 @@ from typing import Any
 class Requirement:
     """A bound on one number of a benchmark's result.
 
-    `name`: text for the report.  `keys`: where the number is in the result, from the outermost key.  `at_least` and `at_most`: bounds;
-    None: no bound.  `aim`: a better value, which is printed but does not change the verdict.
+    `name`: text for the report.  `keys`: the keys that lead to the number in the nested dicts of the result, the outermost first.
+    `at_least` and `at_most`: bounds; None: no bound.  `aim`: a better value, which is printed but does not change the verdict.
     """
 
     name: str

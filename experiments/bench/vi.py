@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Planning: how exact and how fast value iteration is, beside exact policy iteration, SciPy's sparse matrices and quantecon."""
+"""Planning: how exact and fast value iteration is, compared with exact policy iteration, SciPy's sparse matrices and quantecon."""
 
 from __future__ import annotations
 
@@ -62,9 +62,9 @@ QUICK = Settings(problems=50, rounds=3, observations=50, large_rounds=1)
 def measure(settings: Settings) -> dict[str, Any]:
     """Run this benchmark and return its result; raises NotInstalled without quantecon.
 
-    Main keys: "us", a dict from a solver to the median time of a plan [us]; "cold_times_scipy" and the like, time of a peer over the time
-    of our plan from zero values ("cold") or from the values of the plan before ("warm"); "difference", largest relative difference from
-    policy iteration; "residual", largest Bellman residual in units of the tolerance; "requirements", a list with the dict that
+    Main keys: "us", a dict from a solver to the median processor time of a plan [us]; "cold_times_scipy" and the like, time of a peer over
+    the time of our plan from zero values ("cold") or from the values of the plan before ("warm"); "difference", largest relative difference
+    from policy iteration; "residual", largest Bellman residual in units of the tolerance; "requirements", a list with the dict that
     `Requirement.judge` returns for each requirement; "passed", whether all are met.
     """
     load_quantecon()
@@ -104,7 +104,10 @@ def report(result: dict[str, Any]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """The outcomes of one state-action, their probabilities, both (B,) for B bins, and its reward."""
+    """The entries of one state-action in the tables of a decision problem.
+
+    `outcomes`, `probabilities`: (B,), the next states and their probabilities.  `reward`: of the state-action.
+    """
 
     state: int
     action: int
@@ -115,9 +118,9 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Tables:
-    """The tables of a decision problem with S states, A actions and B bins of outcomes.
+    """The tables of a decision problem (MDP) with S states, A actions of each state, and B possible outcomes of each action.
 
-    `outcomes` (S, A, B): the next states; `probabilities` (S, A, B); `reward` (S, A).
+    `outcomes` (S, A, B): the next states; several entries may be unused (probability 0); `probabilities` (S, A, B); `reward` (S, A).
     """
 
     outcomes: Ints
@@ -137,7 +140,7 @@ class Tables:
 
 @dataclass(frozen=True, slots=True)
 class ChangingProblem:
-    """A decision problem and a sequence of changes of one state-action each.
+    """A decision problem and a sequence of changes, each of which replaces the entries of one state-action.
 
     `changes`: the changes by some observations, then the reversals of these changes in reverse order, so that all together restore
     `tables`.
@@ -153,7 +156,7 @@ class ChangingProblem:
 
 
 def with_changes(tables: Tables, observations: Iterable[Row]) -> ChangingProblem:
-    """Return the problem `tables` with changes: each row of `observations` in order, then the restored rows in reverse order."""
+    """Return the problem `tables` with changes: each row of `observations` in order, then the original rows in reverse order."""
     forward, back = [], []
     for row in observations:
         forward.append(row)
@@ -167,8 +170,8 @@ def with_changes(tables: Tables, observations: Iterable[Row]) -> ChangingProblem
 def random_problem(seed: int) -> tuple[Tables, float]:
     """Return a random decision problem and a discount factor, both drawn with `seed`.
 
-    The problem has empty outcome bins, positive and negative rewards, actions that do not exist (reward -inf, or no outcome), and states
-    without any action.
+    The problem has unused outcomes (probability 0), positive and negative rewards, actions that do not exist (reward -inf, or no outcome),
+    and states without any action.
     """
     rng = np.random.default_rng(seed)
     shape = tuple(int(rng.integers(2, high)) for high in (40, 9, 7))
@@ -222,8 +225,9 @@ def _tables_of(agent: CuriousAgent) -> Tables:
 def contestants(problem: ChangingProblem, discount: float = DISCOUNT, repeats: int = 20) -> dict[str, Contestant]:
     """Return a dict from the name of each solver to a contestant; each run repeats its plans `repeats` times.
 
-    "ours, warm" plans after each change of the problem and starts from the values of the plan before.  Raises ArithmeticError if a peer's
-    values differ from the exact ones by more than the tolerance allows.  `discount`: factor of future rewards.
+    "ours, warm" plans after each change of the problem and starts from the values of the plan before; "changes of the model alone" only
+    makes the changes, so that their time can be subtracted.  Raises ArithmeticError if a peer's values differ from the exact ones by more
+    than the tolerance allows.  `discount`: factor of future rewards.
     """
     first = problem.tables
     peer = DecisionProblem(first, first.reward, discount, TOLERANCE)

@@ -50,7 +50,10 @@ Work = Callable[[Cell], dict[str, Any]]
 
 @dataclass(frozen=True)
 class CellResult:
-    """A finished cell, which is one run of a sweep.  It is read from its file `path`; its values are read at the first access."""
+    """The result of a finished cell (one run of a sweep), read from its .npz file.
+
+    `cell`: settings and seed of the run.  `path`: the file; `values` reads it at the first access.
+    """
 
     cell: Cell
     seconds: float
@@ -72,7 +75,7 @@ _RECORD, _ARRAY = "record", "array."  # names in the archive: of the JSON text, 
 def write_cell(folder: Path, cell: Cell, values: dict[str, Any], seconds: float) -> None:
     """Write the values of a cell to `folder`/cells/<name>.npz; an interruption leaves no incomplete file of this name.
 
-    `folder`: folder of the run.  `values`: dict from names to what the cell's run returned.  `seconds`: duration of the cell's run.  Raises
+    `folder`: folder of the run.  `values`: what the cell's run returned, by name.  `seconds`: duration of the cell's run.  Raises
     InvalidValue for a value that is neither JSON nor an array, and OSError.
     """
     arrays = {key: value for key, value in values.items() if isinstance(value, np.ndarray)}
@@ -99,13 +102,17 @@ def cell_path(folder: Path, name: str) -> Path:
 
 
 def load_cells(folder: Path) -> dict[str, CellResult]:
-    """Return a dict from the name (sorted) of each finished cell in the folder of a run to the cell; InvalidValue for a damaged file."""
+    """Return the finished cells in the folder of a run, by name and sorted by name; raises InvalidValue for a damaged file."""
     return {path.stem: read_cell(path) for path in sorted((folder / FOLDER).glob("*.npz"))}
 
 
 @contextmanager
 def reduced_cells(folder: Path, summary: Callable[[dict[str, Any]], dict[str, Any]]) -> Iterator[Path]:
-    """Write the finished cells of a run into a temporary folder, each with the values `summary(values)`, and yield this folder."""
+    """Yield a temporary folder with the finished cells of a run, in which `summary(values)` stands in place of the values of each cell.
+
+    A context manager: the temporary folder is removed at the end.  `folder`: folder of the run.  `summary`: function that reduces the
+    values of a cell.
+    """
     with tempfile.TemporaryDirectory(prefix="mobee-cells-") as reduced:
         for one in load_cells(folder).values():
             write_cell(Path(reduced), one.cell, summary(one.values), one.seconds)

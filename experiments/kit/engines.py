@@ -31,10 +31,10 @@ def cores() -> int:
 
 
 def in_processes(work: Work, cells: Sequence[Cell], jobs: int | None) -> Iterator[Done]:
-    """Run the cells in `jobs` processes of this machine, and yield each as it finishes, in any order; with one job, in this process.
+    """Run the cells in `jobs` processes of this machine, and yield the result of each as it finishes, in any order.
 
-    `work`: computes the values of a cell; a function of a module, so that other processes can import it.  `jobs`: None: one for each
-    processor core.
+    With one job, the cells run in this process.  `work`: computes the values of a cell; a function of a module, so that other processes can
+    import it.  `jobs`: None: one for each processor core.
     """
     count = min(jobs or cores(), len(cells))
     if count == 1:
@@ -187,7 +187,7 @@ class RayMissing(MobeeError):
 
 
 def on_ray(work: Work, cells: Sequence[Cell], jobs: int | None) -> Iterator[Done]:
-    """Run the cells on the Ray cluster that this machine belongs to, and yield each as it finishes, in any order.
+    """Run the cells on the Ray cluster that this machine belongs to, and yield the result of each as it finishes.
 
     Without a cluster, Ray runs the cells on this machine alone.  `work`: computes the values of a cell; a function of a module.  `jobs`:
     number of cells that run at the same time; None: one for each processor.  MoBeE must be installed on all machines of the cluster.

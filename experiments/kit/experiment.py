@@ -35,10 +35,10 @@ Holds = bool | None | Literal["stronger"]
 
 @dataclass(frozen=True)
 class Envelope:
-    """Whether a claim holds in each setting of something that the publications leave open.
+    """The outcomes of a claim in several settings of something that the publications leave open.
 
-    `what`: what differs between the settings, as "unit of distance".  `holds`: whether the claim holds, by the name of the setting, as "1
-    cm".
+    `what`: what differs between the settings, as "unit of distance".  `holds`: the outcome in each setting, by the setting's name, as "1
+    cm": True, False, None (not decided) or "stronger" (the effect is larger than published).
     """
 
     what: str
@@ -93,8 +93,10 @@ def in_settings(what: str, rule: Rule, settings: Mapping[str, Any]) -> Measured 
 
     Returns a text and an outcome.  The text has our numbers in the first setting, and in each other setting whose outcome differs from that
     of the first.  The outcome is an Envelope with the outcome of each setting; if only one setting has enough runs, it is that setting's
-    outcome.  If the rule itself returns an Envelope (outcomes in its own, inner settings), and the same one in all settings, this is the
-    outcome; if these Envelopes differ, the outcome is one Envelope in which each pair of a setting and an inner setting is an entry.
+    outcome.
+
+    A rule may itself return an Envelope, over inner settings.  If this Envelope is the same in all settings, it is the outcome.  If not,
+    the outcome is one Envelope with an entry for each pair of a setting and an inner setting.
     """
     each = {name: found for name, runs in settings.items() if (found := rule(runs)) is not None}
     if not each:
@@ -189,8 +191,8 @@ def claim(source: str, text: str, published: str, varies: str = "", untested: st
 def judged(claims: Iterable[Claim], runs: Any, complete: bool = True) -> list[dict[str, Any]]:
     """Return the claims as dicts (see `Claim.record`), measured and judged by their rules from `runs`.
 
-    `complete`: whether the runs suffice.  If they do not, the rules are not called, and all claims keep their text without measured
-    numbers.
+    `runs`: the runs, in the form that the rules of the experiment take.  `complete`: whether the runs suffice.  If they do not, the rules
+    are not called, and the claims are returned without measured numbers.
     """
     return [(_by_rule(claim, runs) if complete else claim).record() for claim in claims]
 
@@ -219,7 +221,7 @@ class Method(Protocol):
 
     @property
     def kept(self) -> tuple[str, ...]:
-        """Glob patterns of the files from which `results` and `figure` compute; these files are the raw record of a run."""
+        """Glob patterns of the files from which `results` and `figure` compute; these files of a run are kept in the repository."""
 
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
         """Add the options of the experiment to the parser, which has `--seed`, `--runs`, `--resume` and `--json` already."""
@@ -228,7 +230,7 @@ class Method(Protocol):
         """Run the experiment with these options, and return its results as JSON values; `folder`: where it writes what is finished."""
 
     def recorded(self, folder: Path) -> AbstractContextManager[Path]:
-        """Return a context manager that yields the folder from which the raw record of a finished run is copied.
+        """Return a context manager that yields the folder whose files are kept in the repository as the raw record of a finished run.
 
         The raw record is the copy of those files that match `kept`; the results can be computed from it again.  `folder`: folder of the
         run.  The yielded folder is `folder` itself, which has other files, too; or, if the experiment keeps only a summary of its values, a
@@ -248,8 +250,8 @@ class Steps:
 
     `add_arguments`, `run`, `figure`, `kept`: as in `Method`.  `recomputed`: function that computes the results from the folder of a run;
     None for an experiment without claims.  `summary`: function that replaces the values of each cell (a finished part of a run) by a
-    summary of them, for the raw record, if the files `kept` are cells; the summary must give the same results, and must not change if it is
-    summarised again.
+    summary of them, for the raw record (the files kept in the repository), if the files `kept` are cells.  The results must be the same
+    with the summary, and a summary of a summary must be equal to it.
     """
 
     add_arguments: Callable[[argparse.ArgumentParser], None]
@@ -260,7 +262,7 @@ class Steps:
     summary: Callable[[dict[str, Any]], dict[str, Any]] | None = None
 
     def recorded(self, folder: Path) -> AbstractContextManager[Path]:
-        """Return a context manager that yields the folder from which the raw record of a run is copied, as in `Method.recorded`.
+        """Return a context manager that yields the folder whose files are the raw record of a run, as in `Method.recorded`.
 
         It is the run's folder; or, if there is a `summary`, a temporary folder with the summaries of the cells.
         """

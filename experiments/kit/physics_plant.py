@@ -35,7 +35,7 @@ SLOW = float(np.deg2rad(1.0))  # rad/s, of motors at rest
 
 
 class PhysicsPlant:
-    """A `mobee.reach.ReachPlant` whose body MuJoCo simulates, under the control law's default gains and with the published motors.
+    """A `mobee.reach.ReachPlant` whose body MuJoCo simulates, under the control law's default gains and with the default motor parameters.
 
     Args:
         model: the robot in the world as it is believed to be.
@@ -127,12 +127,12 @@ class PhysicsPlant:
         return self._reaches.outcome(part)
 
     def follow_path(self, path: Array, speed: float, watch: BumpWatch | None = None, forces: Forces | None = None) -> Followed:
-        """Move along a path, postures (K, n) rad, at a share `speed` of the largest speed, and return how the motion ended.
+        """Move along a path, and return how the motion ended.
 
-        `watch`: detects bumps; after a bump the robot moves back a little and the motion ends; None: bumps are not detected. `forces`:
-        function that takes a posture (n,) rad and returns the forces (n,) rad/s^2 of the control law except spring and damping.  The
-        attractor is shifted such that its spring cancels these forces; None: they are not cancelled.  The method implements
-        `mobee.behaviours.pick.Body.follow_path`.
+        `path`: (K, n) rad, postures in order of time.  `speed`: share of the largest speed.  `watch`: detects bumps; after a bump the robot
+        moves back a little and the motion ends; None: bumps are not detected. `forces`: function that takes a posture (n,) rad and returns
+        the forces (n,) rad/s^2 of the control law except spring and damping.  The attractor is shifted such that its spring cancels these
+        forces; None: they are not cancelled.  The method implements `mobee.behaviours.pick.Body.follow_path`.
         """
         wanted = timed(self.robot, np.clip(path, *self.robot.limits.T), self.controller.gains, speed)
         if watch is not None:

@@ -22,7 +22,8 @@ class MatplotlibMissing(MobeeError):
 def new_figure(width: float, height: float) -> Any:
     """Return an empty Matplotlib Figure of this width and height in inches.
 
-    Raises MatplotlibMissing, and InvalidValue for a size of 0, which a figure has if none of the runs that it shows is finished.
+    Raises MatplotlibMissing.  Raises InvalidValue for a size of 0: a caller asks for this size if no run is finished that the figure could
+    show.
     """
     if not (width > 0.0 and height > 0.0):
         raise InvalidValue("none of the runs that the figure shows is finished: continue the run with --resume.")
@@ -83,8 +84,8 @@ def draw_curve(axes: Any, at: ArrayLike, runs: Array, color: str, label: str) ->
 def draw_band(axes: Any, at: ArrayLike, groups: Sequence[ArrayLike], line: str, color: str, alpha: float = 0.15, **style: Any) -> None:
     """Draw the interquartile mean of each group of runs as a line, and the 95 % bootstrap intervals as a band.
 
-    `at`: x value of each group.  `groups`: the numbers of the runs of each group.  `line`: Matplotlib's format of the line, as "o-".
-    `alpha`: opacity of the band.  `style`: passed to `axes.plot`.
+    `at`: x value of each group.  `groups`: for each group, a number from each of its runs.  `line`: Matplotlib's format of the line, as
+    "o-".  `alpha`: opacity of the band.  `style`: passed to `axes.plot`.
     """
     means, low, high = _of(groups)
     axes.plot(at, means, line, color=color, **style)
@@ -94,8 +95,8 @@ def draw_band(axes: Any, at: ArrayLike, groups: Sequence[ArrayLike], line: str, 
 def draw_bars(axes: Any, at: ArrayLike, groups: Sequence[Array], width: float, color: str, label: str) -> None:
     """Draw the interquartile mean of each group of runs as a bar, and its 95 % bootstrap interval as a whisker.
 
-    `at`: x value of each group.  `groups`: the numbers of the runs of each group.  `width`: width of a bar, in units of the x axis.
-    `axes`: of Matplotlib.  `color`: of the bars.  `label`: of the bars in the legend.
+    `at`: x value of each group.  `groups`: for each group, a number from each of its runs.  `width`: width of a bar, in units of the x
+    axis.  `axes`: of Matplotlib.  `color`: of the bars.  `label`: of the bars in the legend.
     """
     means, low, high = _of(groups)
     spread = np.maximum([means - low, high - means], 0.0)  # an interval need not hold the mean
@@ -105,7 +106,7 @@ def draw_bars(axes: Any, at: ArrayLike, groups: Sequence[Array], width: float, c
 def draw_points(axes: Any, at: ArrayLike | Sequence[str], groups: Sequence[ArrayLike], **style: Any) -> None:
     """Draw the interquartile mean of each group of runs as a point, and its 95 % bootstrap interval as a whisker.
 
-    `at`: x value or label of each group.  `groups`: the numbers of the runs of each group.  `style`: passed to `axes.errorbar`.
+    `at`: x value or label of each group.  `groups`: for each group, a number from each of its runs.  `style`: passed to `axes.errorbar`.
     """
     means, low, high = _of(groups)
     spread = np.maximum([means - low, high - means], 0.0)  # an interval need not hold the mean
@@ -123,7 +124,7 @@ def draw_heights(axes: Any, values: ArrayLike, **style: Any) -> None:
 def draw_stacked_bars(axes: Any, runs: Sequence[Array]) -> Array:
     """Draw the numbers of several runs as stacked bars at x = 0, 1, ..., with a colour for each run; returns the total heights (L,).
 
-    `runs`: L numbers of each run.  `axes`: of Matplotlib.
+    `runs`: for each run, the heights (L,) of its share of the bars.  `axes`: of Matplotlib.
     """
     heights = np.zeros(len(runs[0]))
     for run in runs:

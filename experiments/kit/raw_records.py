@@ -26,19 +26,19 @@ _NO_TIME = (1980, 1, 1, 0, 0, 0)  # the same files give the same archive
 
 
 class TooLarge(InvalidValue):
-    """Raised for a raw record that is too large for the repository: more than MAX_BYTES (2 MB)."""
+    """Raised if the archive of a run is too large for the repository: more than MAX_BYTES (2 MB)."""
 
 
 def record_path(name: str, confirms: bool = False) -> Path:
-    """Return the path of the archive of an experiment.
+    """Return the path of the archive with the recorded values of an experiment.
 
-    `confirms`: return the archive of the run with new seeds, which confirms the first run, instead of that of the first run.
+    `confirms`: False: the archive of the first run; True: that of the later run with new seeds, which confirms the first run.
     """
     return RECORDS / f"{name}{'-confirm' if confirms else ''}{_SUFFIX}"
 
 
 def all_records() -> list[Path]:
-    """Return the paths of all archives, sorted."""
+    """Return the paths of the archives of all experiments, sorted."""
     return sorted(RECORDS.glob(f"*{_SUFFIX}"))
 
 
@@ -109,10 +109,10 @@ def _unpacked(path: Path) -> bytes:
 
 @contextmanager
 def opened_record(name: str, confirms: bool = False) -> Iterator[Path]:
-    """Extract the archive of an experiment into a temporary folder, which has the files of the run's folder, and yield this folder.
+    """Extract the archive of an experiment into a temporary folder, and yield this folder, which has the files of the run's folder.
 
-    `confirms`: open the archive of the run with new seeds, which confirms the first run, instead of that of the first run.  Raises
-    InvalidValue if there is no archive, or if it is damaged.
+    A context manager: the folder is removed at the end.  `confirms`: False: the archive of the first run; True: that of the later run with
+    new seeds, which confirms the first run.  Raises InvalidValue if there is no archive, or if it is damaged.
     """
     path = record_path(name, confirms)
     if not path.exists():

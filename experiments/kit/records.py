@@ -57,7 +57,7 @@ def _whole(file: TextIO) -> int:
 
 
 def rounded(**values: Any) -> dict[str, Any]:
-    """Return the keyword arguments as a dict, the values of a cell; floats are rounded to six decimals."""
+    """Return the keyword arguments as a dict, with floats rounded to six decimals: the values that one run of a sweep returns."""
     return {name: round(value, 6) if isinstance(value, float) else value for name, value in values.items()}
 
 
@@ -73,7 +73,7 @@ class Row:
         return tuple(field.name for field in fields(cls))
 
     def record(self) -> dict[str, object]:
-        """Return the fields by name, as a record of the file or as the values of a cell.
+        """Return the fields by name, as one record of the file, or as the values of a cell (one run of a sweep).
 
         Floats are rounded to PLACES decimals, 6 unless a subclass sets another number (None: they are not rounded).  Characters of texts
         that are not ASCII are written as escapes.

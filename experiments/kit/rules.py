@@ -36,15 +36,15 @@ ABOUT_EQUAL = (0.9, 1.1)
 
 
 def row(runs: Sequence[Run], columns: Mapping[str, Callable[[Run], float]]) -> dict[str, Any]:
-    """Return a row of results: the number of runs under "seeds", and under each label the interquartile mean over the runs.
+    """Return a row of results: under "seeds" the number of runs, and under each label the interquartile mean of a number of the runs.
 
-    `columns`: function that computes a number from a run, by label.
+    `columns`: by label, the function that computes this number from a run.
     """
     return {"seeds": len(runs)} | {label: mean_over(runs, number) for label, number in columns.items()}
 
 
 def of_each(groups: Mapping[Key, Iterable[Run]], number: Callable[[Run], float]) -> dict[Key, list[float]]:
-    """Return a dict from the key of each group to the list of the numbers that the function `number` computes from its runs."""
+    """Return for each group, by its key, the list of the numbers that the function `number` computes from the runs of the group."""
     return {key: [number(run) for run in runs] for key, runs in groups.items()}
 
 
@@ -52,7 +52,7 @@ def texts(values: Mapping[Any, ArrayLike], digits: int = 2, form: str = "{} {}")
     """Return the estimates of all groups as text, separated by commas; an estimate is the interquartile mean with its 95 % interval.
 
     Args:
-        values: the numbers of each group, by its key.
+        values: for each group, by its key, a number from each of its runs.
         digits: decimals of an estimate.
         form: format of each entry; the first {} is the key, with spaces for underscores, the second the estimate.
     """
@@ -76,8 +76,8 @@ def all_hold(verdicts: Iterable[bool | None]) -> bool | None:
 def within(values: ArrayLike, digits: int = 2, least: float = -np.inf, most: float = np.inf, text: str = "{}") -> Decided:
     """Judge by the interval whether the interquartile mean of a group lies within [least, most].
 
-    Returns our number as text and the verdict.  `values`: the numbers of the runs.  `digits`: decimals of the estimate.  `text`: format of
-    the text; {} is the estimate.
+    Returns our number as text, and whether the claim holds (None: the interval does not decide it).  `values`: a number from each run of
+    the group.  `digits`: decimals of the estimate.  `text`: format of the text; {} is the estimate.
     """
     return text.format(estimate(values, digits)), decides(interval(values), least, most)
 
@@ -87,8 +87,9 @@ def ratio_within(
 ) -> Decided:
     """Judge by the interval whether the ratio of the interquartile means of two groups lies within [least, most].
 
-    Returns our number as text and the verdict.  `above`, `below`: the numbers of the runs of each group.  `digits`: decimals of the
-    estimate.  `text`: format of the text; {} is the estimate.
+    Returns our number as text, and whether the claim holds (None: the interval does not decide it).  `above`, `below`: a number from each
+    run of the group in the numerator, and of that in the denominator.  `digits`: decimals of the estimate.  `text`: format of the text; {}
+    is the estimate.
     """
     return text.format(ratio_estimate(above, below, digits)), decides(ratio_interval(above, below), least, most)
 
@@ -108,7 +109,7 @@ def equivalent(first: ArrayLike, second: ArrayLike, margin: float) -> bool | Non
     """Return whether the interquartile means of two groups differ by less than `margin`, by the interval of their difference.
 
     True if the whole interval lies within [-margin, margin] (two one-sided tests), False if it lies outside, None if it contains a bound.
-    `first`, `second`: the numbers of the two groups.
+    `first`, `second`: a number from each run of the two groups.
     """
     return decides(difference_interval(first, second), -margin, margin)
 
@@ -124,7 +125,7 @@ def is_above(first: ArrayLike, second: ArrayLike) -> bool | None:
 def stands_above(values: Mapping[Key, ArrayLike], name: Key, least: float = -np.inf) -> bool | None:
     """Return whether the interquartile mean of the group `name` is above those of all other groups, and above `least`.
 
-    `values`: the numbers of the runs of each group, by its key.  None: the 95 % intervals do not decide it.
+    `values`: for each group, by its key, a number from each of its runs.  Returns None if the 95 % intervals do not decide it.
     """
     apart = [is_above(values[name], group) for key, group in values.items() if key != name]
     return all_hold([*apart, *([decides(interval(values[name]), least=least)] if least > -np.inf else [])])
@@ -133,7 +134,7 @@ def stands_above(values: Mapping[Key, ArrayLike], name: Key, least: float = -np.
 def stands_below(values: Mapping[Key, ArrayLike], name: Key) -> bool | None:
     """Return whether the interquartile mean of the group `name` is below those of all other groups.
 
-    `values`: the numbers of the runs of each group, by its key.  None: the 95 % intervals do not decide it.
+    `values`: for each group, by its key, a number from each of its runs.  Returns None if the 95 % intervals do not decide it.
     """
     return all_hold(is_above(group, values[name]) for key, group in values.items() if key != name)
 
@@ -141,8 +142,8 @@ def stands_below(values: Mapping[Key, ArrayLike], name: Key) -> bool | None:
 def better(values: Mapping[str, ArrayLike], name: str, rivals: Sequence[str], worse: bool = False, digits: int = 2) -> Decided:
     """Judge whether the runs of the group `name` are above those of every rival, or with `worse` below; returns text and verdict.
 
-    `values`: the numbers of the runs of each group, by its key.  The runs are above a rival's if the interval of the probability of
-    improvement lies above one half.  They are not above if this interval lies below one half, or if both groups are equivalent: the
+    `values`: for each group, by its key, a number from each of its runs.  The runs are above a rival's if the interval of the probability
+    of improvement lies above one half.  They are not above if this interval lies below one half, or if both groups are equivalent: the
     interval of the ratio of their means lies within 0.9 to 1.1.  `digits`: decimals in the text.
     """
     parts, verdicts = [f"{name} {estimate(values[name], digits)}"], list[bool | None]()
@@ -163,7 +164,7 @@ def _about_equal(first: ArrayLike, second: ArrayLike) -> bool:
 
 
 def rises(change: ArrayLike) -> bool | None:
-    """Return whether the interquartile mean of `change`, a number of each run, is above 0, by its interval.
+    """Return whether the interquartile mean of `change`, a number from each run, is above 0, by its interval.
 
     True if the whole interval is above 0, False if no part of it is, None if only a part is.
     """
@@ -178,6 +179,6 @@ def _sign(span: tuple[float, float]) -> bool | None:
 def changes(before: Array, after: Array) -> str:
     """Return as text the interquartile means before and after a change, and the mean of the change with its 95 % interval.
 
-    `before`, `after`: (N,), a number of each run.
+    `before`, `after`: (N,), a number from each of the N runs.
     """
     return f"from {interquartile_mean(before):.2f} to {interquartile_mean(after):.2f}, by {estimate(after - before)}"

@@ -72,7 +72,7 @@ def options_of(folder: Path, name: str) -> dict[str, Any]:
 
 
 def keep_options(folder: Path, name: str, options: Mapping[str, Any]) -> None:
-    """Write the options with which a run of the experiment `name` continues into config.json, if they differ from the recorded ones."""
+    """Write into config.json the options with which a run of the experiment `name` continues, if they differ from the recorded ones."""
     if options_of(folder, name) != json.loads(json.dumps(options, default=str)):
         write(folder / CONFIG, {"experiment": name, "options": dict(options)})
 

@@ -80,7 +80,7 @@ class Sweep:
         seeds: default of the option --seeds.
         add_options: function that adds the options of the experiment to a parser.
         require: function that is called before the first trial; raises MobeeError if an optional package that the trials need is absent.
-        kept: glob patterns of the files that are the raw record of a run.
+        kept: glob patterns of the files in a run's folder that are kept in the repository as its raw record.
         summary: function that reduces the values of a cell to those from which `findings` and `plot` compute, for runs whose values are too
             large for the raw record; `findings` and `plot` get the reduced values.  None: the values are not reduced.
     """
@@ -172,7 +172,7 @@ def grouped_by(found: Cells, *settings: str) -> dict[tuple[Any, ...], list[dict[
 
 
 def runs_by(found: Cells, of: Callable[[CellResult], Run], *settings: str) -> dict[tuple[Any, ...], list[Run]]:
-    """Return what the function `of` computes from each finished cell in groups: a list sorted by seed for each combination of settings.
+    """Call `of` on each finished cell, and return the results in groups: a list sorted by seed for each combination of settings.
 
     The key of a group is the tuple of the values of the named settings.
     """

@@ -60,7 +60,7 @@ class Scalars:
 
 
 class LearningCurves:
-    """Writes the curves of one agent, computed from its transitions, into an event file.
+    """Writes the learning curves of one agent, computed from its transitions, into an event file of TensorBoard.
 
     The curves are: reward: information gain [nats]; surprise: -ln of the probability that the agent gave to the outcome [nats]; tried:
     share of its state-actions that were tried; predictable: share of its state-actions that were tried at least twice and had the same
@@ -94,9 +94,9 @@ class LearningCurves:
 
 @contextmanager
 def tracked(folder: Path) -> Iterator[None]:
-    """Write the curves of all agents that learn in this process during a `with` statement, each into `folder`/<name of its part>.
+    """Write the learning curves of all agents that learn in this process during a `with` statement, each into `folder`/<name of its part>.
 
-    An inner `tracked` replaces the outer one until it ends.
+    The files are event files of TensorBoard.  An inner `tracked` replaces the outer one until it ends.
     """
     curves: dict[CuriousLearner, LearningCurves] = {}
     parts = Counter[str]()

@@ -30,9 +30,9 @@ SIDEWAYS = {"shoulder_pitch": -2.0, "shoulder_roll": 65.0, "elbow": 28.0}  # deg
 def two_robots() -> Robot:
     """Return the iCub and the Katana joined into one robot; names of the Katana begin with "katana_".  Every call returns the same object.
 
-    The Katana's file has no fields, the volumes around links that cause repulsive forces.  Here the Katana gets narrow fields, which are
-    tested against its own links, because wide fields would overlap; and wide fields (6 cm), which are tested only against the iCub's
-    fields.
+    The Katana's file has no fields, the volumes around links that cause repulsive forces.  Here the Katana gets two sets.  Its narrow
+    fields are tested against its own links, because wide ones would overlap each other.  Its wide fields (6 cm) are tested only against the
+    fields of the iCub.
     """
     icub, katana = load_robot("icub"), derive(load_robot("katana")).robot
     wide = [grown(solid, WIDTH, f"{solid.name}_wide_field") for solid in katana.shapes if solid.role == "solid" and solid.link > 0]

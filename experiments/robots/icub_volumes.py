@@ -3,13 +3,12 @@
 
 Zero pose, root frame, [m]; the right arm mirrors the left in y.
 
-The fields are few spheres and capsules around the solids of each body section. Beyond the solids the fields of hand and fingers reach
-5 to 7 cm, forearm 5, elbow, torso and head 3 to 4, upper arm 3, and the flanks of pelvis and chest 1, because an arm hangs beside them
-at home.
+The fields are few spheres and capsules around the solids of each body section. Beyond the solids the fields of hand and fingers reach 5 to
+7 cm, forearm 5, elbow, torso and head 3 to 4, upper arm 3, and the flanks of pelvis and chest 1, because an arm hangs beside them at home.
 
-Data models.icub_v2_5 encloses pelvis, chest and head in one box, cylinder and sphere of 1.5 to 1.7 times the hull's volume, so
-that pelvis and upper arm would touch at home. BOXES are the bounds, rounded outwards to 1 mm, of the part of a mesh of icub-models
-(CC BY-SA 4.0) between horizontal cuts.
+The entry models.icub_v2_5 of the JSON data encloses pelvis, chest and head in a box, a cylinder and a sphere of 1.5 to 1.7 times the hull's
+volume; with these, pelvis and upper arm would touch at home. BOXES are the bounds, rounded outwards to 1 mm, of the part of a mesh of
+icub-models (CC BY-SA 4.0) between horizontal cuts.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Write mobee/robot/robots/icub.xml, the iCub v2.5 upper body with 41 motors.
 
-Source: data models.icub_v2_5 (derived from robotology/icub-models, CC BY-SA 4.0), yarp_parts, shoulder_constraints.mobee_2014; fields are
-ours.  The file names the meshes of the installed icub-models, which viewers draw.
+Source: the entries models.icub_v2_5 (derived from robotology/icub-models, CC BY-SA 4.0), yarp_parts and shoulder_constraints.mobee_2014 of
+DATA.json; fields are ours.  The file names the meshes of the installed icub-models, which viewers draw.
 
 Usage: python -m experiments.robots.write_icub DATA.json [OUT.xml]
 """
@@ -263,14 +263,14 @@ def add_fields(parent: ET.Element, link: str, point: Array) -> None:
 
 
 def fields() -> list[Field]:
-    """Return the fields of all links: name, link, radius [m], and both ends (3,) m of the axis, in the root frame at zero pose."""
+    """Return the fields of all links: name, link, radius [m], and both ends (3,) m of its axis, root frame at zero pose."""
     mirror = [(n, k, r, (a[0], -a[1], a[2]), (b[0], -b[1], b[2])) for n, k, r, a, b in LEFT_ARM]
     arms = [(f"l_{n}", f"l_{k}", r, a, b) for n, k, r, a, b in LEFT_ARM] + [(f"r_{n}", f"r_{k}", r, a, b) for n, k, r, a, b in mirror]
     return TRUNK + HEAD + arms
 
 
 def add_visuals(parent: ET.Element, model: dict[str, Any], link: str, point: Array) -> None:
-    """Add the visuals of a link to the XML element `parent`: the mesh that the URDF has for this link, or for hands, their solids.
+    """Add what viewers draw of a link to the XML element `parent`: the mesh that the URDF has for this link, or for hands, their solids.
 
     Positions are written relative to `point` (3,) m, root frame; the link has the same zero pose in the URDF. The URDF's mesh of a hand
     cannot be used: palm and fingers are one piece, so the fingers would not move.

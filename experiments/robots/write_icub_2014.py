@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Write mobee/robot/robots/icub_2014.xml, the iCub model published with MoBeE in 2014.
 
-Source: data mobee_original (numbers of kailfrank/MoBeE, no text taken), shoulder_constraints.mobee_2014.
+Source: the entries mobee_original (numbers of kailfrank/MoBeE, no text taken) and shoulder_constraints.mobee_2014 of DATA.json.
+
 Usage: python -m experiments.robots.write_icub_2014 DATA.json [OUT.xml]
 """
 
@@ -32,10 +33,11 @@ LISTED_LENGTH = 1.0  # in the data, of an element that the file gives no length
 
 
 class Tree:
-    """The entry "mobee_original" of the JSON data, with dicts for look-ups: nodes by id, and names and joints of motors.
+    """The entry "mobee_original" of the JSON data, with dicts for look-ups.
 
-    `data`: the whole JSON data.  `motors`: motors by part.  `axis`: name of a motor in YARP, by its name in the data.  `joints`: ids of the
-    joints that a motor drives, by its name in YARP.  `links`: name of the link that a joint moves in icub.xml, by the joint's name.
+    `data`: the whole JSON data.  `nodes`: the links and joints, by id.  `motors`: motors by part.  `axis`: name of a motor in YARP, by its
+    name in the data.  `joints`: ids of the joints that a motor drives, by its name in YARP.  `links`: name of the link that a joint moves
+    in icub.xml, by the joint's name.
     """
 
     def __init__(self, data: dict[str, Any]) -> None:

@@ -35,7 +35,7 @@ def vector(names: str, values: Array, digits: int = 7) -> dict[str, str]:
 
 
 def box_turn(rotation: Array) -> dict[str, str]:
-    """Return the XML attributes hx, hy, hz (height axis) and angle [deg] of a box with the orientation `rotation` (3, 3), root frame.
+    """Return the XML attributes of a box with the orientation `rotation` (3, 3), root frame: hx, hy, hz (height axis) and angle [deg].
 
     Attributes with the default value are left out.
     """

@@ -32,9 +32,10 @@ MARGIN = np.deg2rad(15.0)  # rad along the normal, of a start; constraints push 
 class Command:
     """A command for one arm: a start posture and three phases, each with an attractor and with forces that a client of the robot exerts.
 
-    `start` (7,) and `attractors` (3, 7): motor positions in half ranges from the middle of the range, so -1 to 1 is inside the limits.
-    `seconds`: (3,), durations of the phases.  `forces`: (3, 7), forces at the motors, -1 to 1 in units of STRONG (1000 rad/s^2).  `pushes`:
-    (3, 3), forces at the palm, root frame, -1 to 1 in units of STRONG (1000 N/kg).
+    `start` (7,) and `attractors` (3, 7): positions of the first 7 motors of the arm, all but those of the hand, in half ranges from the
+    middle of the range, so -1 to 1 is inside the limits.  `seconds`: (3,), durations of the phases.  `forces`: (3, 7), forces at these
+    motors, -1 to 1 in units of STRONG (1000 rad/s^2).  `pushes`: (3, 3), forces at the palm, root frame, -1 to 1 in units of STRONG (1000
+    N/kg).
     """
 
     start: Array
@@ -99,7 +100,7 @@ def as_numbers(command: Command) -> list[float]:
 
 
 def from_numbers(numbers: list[float]) -> Command:
-    """Return the command from the list of numbers that `as_numbers` has made of it."""
+    """Return the command from the list of numbers that `as_numbers` returned."""
     ends = np.cumsum([MOTORS, PHASES * MOTORS, PHASES, PHASES * MOTORS])
     start, attractors, seconds, forces, pushes = np.split(np.array(numbers), ends)
     return Command(start, attractors.reshape(PHASES, -1), seconds, forces.reshape(PHASES, -1), pushes.reshape(PHASES, -1))
@@ -122,8 +123,8 @@ class Tried:
 def try_commands(gains: Gains, commands: Sequence[Command], torso: Array, seed: int) -> Tried:
     """Run the iCub at its table with a command for the left arm and one for the right arm, and measure the run.
 
-    `commands`: the command of the left arm, then that of the right arm.  `torso`: (3,), attractor of the torso during the whole run, in
-    half ranges from the middle of the range.  `seed`: seed of the plant's random numbers.
+    `commands`: the command of the left arm, then that of the right arm.  `torso`: (3,), attractor of the torso during the whole run, in the
+    same units as those of `Command.attractors`.  `seed`: seed of the plant's random numbers.
     """
     robot = icub_at_table().robot
     plant = OfflinePlant(icub_at_table(), seed, gains, dt=PERIOD[gains.law])

@@ -77,7 +77,7 @@ def run_plant(
 def place(plant: OfflinePlant, q: Array) -> None:
     """Put a plant at rest in the posture q (n,) rad, with its attractor there.
 
-    The plant runs for REST_TIME (0.4 s); the joints are held until the motors are at rest.
+    The plant runs for REST_TIME (0.4 s), and the joints are put back to q before every tick, until the motors are at rest.
     """
     plant.controller.reset(q)
     for _ in range(round(REST_TIME / plant.dt)):
@@ -90,8 +90,8 @@ def place(plant: OfflinePlant, q: Array) -> None:
 def random_posture(robot: Robot, rng: np.random.Generator, motors: Mapping[str, int], within: tuple[float, float]) -> Array:
     """Draw a random posture (n,) rad of a robot.
 
-    `motors`: number of motors by part: the first ones of each part are drawn, all other motors are at home.  `within`: lowest and highest
-    share of a motor's range between which its position is drawn uniformly.
+    `motors`: by the name of a part, how many of its motors are drawn, from the first on; all other motors are at home.  `within`: lowest
+    and highest share of a motor's range between which its position is drawn uniformly.
     """
     q = robot.home.copy()
     for part, count in motors.items():

@@ -26,7 +26,7 @@ MARGIN = np.deg2rad(15.0)  # rad, distance of a posture from every constraint
 
 @dataclass(frozen=True, slots=True)
 class StepResponse:
-    """Measures of a step response: the largest over the judged joints.
+    """Measures of a step response of several joints: each number is the largest over the judged joints.
 
     `settling`: s until the joint stays within 5 % of the step around its end position.  `overshoot`: share of the step.  `error_deg`:
     degrees between end position and attractor.  `rest_deg`: standard deviation in the last second, degrees.  `is_settled`: whether all
@@ -55,10 +55,10 @@ def motor_step(motor: int) -> tuple[Array, Array]:
 
 
 def postures(count: int, seed: int) -> list[Array]:
-    """Draw `count` postures (n,) rad of torso and arms, to be taken one after the other, the first from home.
+    """Draw `count` postures (n,) rad of torso and arms, for a motion from home through all of them in order.
 
-    On the paths to the first posture and from each one to the next, nothing touches, neither solids nor the larger fields around them, and
-    the postures are at least 15 degrees away from every cable constraint.  `seed`: of the draw.
+    On the path to each posture no solids touch and no fields, which are larger volumes around the solids, and every cable constraint is at
+    least 15 degrees away.  `seed`: of the draw.
     """
     robot, rng = icub().robot, np.random.default_rng(seed)
     found = [robot.home]

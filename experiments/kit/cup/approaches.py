@@ -72,7 +72,7 @@ class RrtPlanner:
         """Return a path (K, n) rad from the posture `start` (n,) to the pre-grasp `goal` (n,), or None if no path was found.
 
         `azimuth` is not used.  `blocked`: (B, 3) m, root frame, positions of the palm at earlier bumps: up to 10 paths are drawn, and the
-        first on which the palm moves around or over these positions is returned.  A path is shortened only if there are none.
+        first on which the palm moves around or over these positions is returned.  If there are no such positions, the path is shortened.
         """
         for _ in range(TRIES if len(blocked) else 1):
             path = rrt_connect(self._world, start, goal, MOTORS, int(self._rng.integers(2**31)))
@@ -85,9 +85,9 @@ class RrtPlanner:
 
 
 def shortened(world: Model, path: Array, rng: np.random.Generator) -> Array:
-    """Return the path (K, n) rad with fewer corners: straight motions between random corners replace the path where they are free.
+    """Return the path (K, n) rad with fewer corners: straight motions between random corners replace the path if free.
 
-    `world`: the robot in the world that it must not touch.
+    A motion is free if nothing touches on it.  `world`: the robot in the world that it must not touch.
     """
     corners = list(path)
     for _ in range(SHORTCUTS):

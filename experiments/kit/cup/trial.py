@@ -43,14 +43,15 @@ GOALS = 24
 class Result:
     """The measures of a trial, in m, rad and s; -1: not measured, because the trial ended earlier.
 
-    At the end of the motion to the pre-grasp: `distance`: of the palm from its place beside the true cup; `angle`: between the palm's
-    normal and its wanted direction; `pushed`: largest distance by which a thing was moved; `knocked`: whether a thing leans more than 25
-    degrees; `pre_grasp`: whether the palm is at most 2 cm and 15 degrees from its place, and nothing was knocked over.
+    At the end of the motion to the pre-grasp, the pose with the open hand beside the cup: `distance`: of the palm from its place beside the
+    true cup; `angle`: between the palm's normal and its wanted direction; `pushed`: largest distance by which a thing was moved; `knocked`:
+    whether a thing leans more than 25 degrees; `pre_grasp`: whether the palm is at most 2 cm and 15 degrees from its place, and nothing was
+    knocked over.
 
     At the end of the trial: `lifted`: height by which the cup was lifted.  `placed`: distance of the cup from its goal.  `done`: whether
-    the cup was lifted, and put down upright near its goal, and nothing was knocked over.  `bumps`, `plans`: numbers of bumps and of plans.
-    `planning`: processor time of the plans.  `clutter`: number of pieces of clutter.  `why`: reason of a failure.  `seconds`: simulated
-    time.
+    the cup was lifted, and put down upright near its goal, and nothing was knocked over.  `bumps`: number of bumps on the motion to the
+    pre-grasp.  `plans`: how often a path was planned.  `planning`: processor time of the plans.  `clutter`: number of pieces of clutter.
+    `why`: reason of a failure.  `seconds`: simulated time.
     """
 
     pre_grasp: bool = False

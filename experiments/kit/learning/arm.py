@@ -125,7 +125,7 @@ def arm_clauses() -> list[Clause]:
 
 @cache
 def min_margin() -> float:
-    """Return the smallest value of a.q + b, the distance from a cable constraint, at which a pose counts as clear of this constraint.
+    """Return the distance from a cable constraint (the value of a.q + b) from which on a pose counts as clear of this constraint.
 
     It is half the width of the zone in which the published control law pushes the arm away from a constraint.  At this distance the force
     moves a resting arm by about three degrees, a quarter of the distance to the edge of a cell of the lattice with three levels per joint.

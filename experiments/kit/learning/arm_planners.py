@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Roadmaps of the published left arm, and planners that are compared with each other.
 
-Vertices and edges of a roadmap are poses and motions that are free in the model that a planner believes in; the graph is OMPL's PRM or the
-lattice of the learners.  The planners are: straight motions, a roadmap planned once, a roadmap replanned after failures, and a learned MDP.
+Vertices and edges of a roadmap are poses and motions that are free in the planner's own model of robot and world.  The graph is OMPL's PRM
+or the lattice of states on which the learners act.  The planners are: straight motions, a roadmap planned once, a roadmap replanned after
+failures, and a learned MDP.
 """
 
 from __future__ import annotations
@@ -74,8 +75,8 @@ class Belief:
 class Roadmap:
     """An undirected graph of V vertices, which are poses of the arm (V, 4) rad.
 
-    The cost of a motion is 1, for the action, plus the length of the motion in fractions of the joints' ranges.  `belief`: the model in
-    which motions are checked when vertices are added or a pose is joined to the graph.
+    The cost of a motion is 1, for the action, plus the length of the motion in fractions of the joints' ranges.  `belief`: the planner's
+    model, in which motions are checked when a vertex is added or the graph is entered from a pose.
     """
 
     def __init__(self, vertices: Array, edges: Iterable[Edge], belief: Belief) -> None:
@@ -92,12 +93,12 @@ class Roadmap:
         return sum(len(costs) for costs in self._costs) // 2
 
     def pose(self, vertex: int) -> Array:
-        """Return the pose (4,) rad of a vertex, given by its number."""
+        """Return the pose (4,) rad of a vertex, given by its index in `vertices`."""
         pose: Array = self.vertices[vertex]
         return pose
 
     def add(self, pose: Array, neighbours: int) -> int:
-        """Add a pose (4,) rad as a vertex, with edges to the vertices that `reachable` returns for `neighbours`; returns its number."""
+        """Add a pose (4,) rad as a vertex, with edges to the vertices that `reachable` returns for `neighbours`; returns its index."""
         joined = self.reachable(pose, neighbours)
         self.vertices = np.concatenate([self.vertices, pose[None]])
         self._costs.append({})
@@ -106,13 +107,14 @@ class Roadmap:
         return len(self.vertices) - 1
 
     def nearest(self, pose: Array, count: int) -> list[int]:
-        """Return the numbers of the `count` vertices nearest to a pose (4,) rad; distances are in fractions of the joints' ranges."""
+        """Return the indices of the `count` vertices nearest to a pose (4,) rad; distances are in fractions of the joints' ranges."""
         return [int(v) for v in np.argsort(self._lengths(pose), kind="stable")[:count]]
 
     def reachable(self, pose: Array, neighbours: int) -> list[int]:
-        """Return which of the nearest vertices (`neighbours` of them) can be reached from a pose (4,) rad by a sound straight motion.
+        """Return those of the `neighbours` vertices nearest to a pose (4,) rad to which a straight motion from the pose is sound.
 
-        If there is none, the cable constraints are ignored; if there is still none, all these nearest vertices are returned.
+        Sound: clear of contacts and cable constraints in the planner's model.  If there is none, the cable constraints are ignored; if
+        there is still none, all these nearest vertices are returned.
         """
         near = self.nearest(pose, neighbours)
         for cables in (True, False):  # a pose that violates the cable constraints may still be reached
@@ -243,7 +245,7 @@ class Straight:
 class PlannedOnce:
     """A `Rival` that plans one path through a roadmap and moves to its vertices one after the other, wherever the motions end.
 
-    `vertex_of`: number of the vertex of each goal state.  `neighbours`: number of near vertices at which the path may start.
+    `vertex_of`: vertex of each goal state, by the state.  `neighbours`: number of near vertices at which the path may start.
     """
 
     repairs = 0
@@ -278,7 +280,7 @@ class Repaired:
 
     Args:
         roadmap: the roadmap, which is not changed.
-        vertex_of: number of the vertex of each goal state.
+        vertex_of: vertex of each goal state, by the state.
         neighbours: number of near vertices to which the arm may return after it was pushed off the roadmap.
         remembers: whether removed motions stay removed in the next query.
     """

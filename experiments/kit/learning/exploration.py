@@ -26,8 +26,8 @@ def begin_anywhere(space: Space, plant: OfflinePlant, seed: int) -> None:
 def begin_nearby(space: Space, plant: Plant, seed: int) -> int:
     """Move the space's part of the robot to a random neighbour of its present state, and return the number of the state that was reached.
 
-    No agent learns from this motion, because it may start anywhere in the cell of a state, and actions start at the cell's sample. `seed`:
-    seed of the choice of the neighbour.
+    No agent learns from this motion, because it may start anywhere in the cell of a state; an agent's action starts where the last one
+    ended. `seed`: seed of the choice of the neighbour.
     """
     state = space.state_of(plant.measure(space.part))
     goal = int(np.random.default_rng(seed).choice(space.actions(state)))
@@ -74,8 +74,9 @@ class LeastTries:
 class Log:
     """The T transitions of one part, as lists of length T.
 
-    `seen`: state, action, state reached.  `settled`: whether the action settled.  `durations`: s.  `ends`: plant time, s.  `touched`: names
-    of the world objects in contact at the end.  `poses`: positions of all motors at the end, (n,) rad.
+    `seen`: state, action, state reached.  `settled`: whether the motors came to rest before the time limit of the action.  `durations`: s.
+    `ends`: plant time, s.  `touched`: names of the world objects in contact at the end.  `poses`: positions of all motors at the end, (n,)
+    rad.
     """
 
     seen: list[tuple[int, int, int]] = field(default_factory=list)
@@ -99,7 +100,7 @@ class Log:
 
 
 def explore_together(agents: Sequence[CuriousAgent], plant: OfflinePlant, transitions: int) -> dict[str, Log]:
-    """Let several agents act at the same time on one plant, as `mobee.run` does, and return a dict from the part to its transitions.
+    """Let several agents act at the same time on one plant, as `mobee.run` does, and return the transitions of each part.
 
     The run ends when every agent has made `transitions` transitions; faster agents make more in the meantime.
     """

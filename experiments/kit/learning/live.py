@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Equal agents on the offline plant and on the live processes in lockstep, and the distances between their outcomes.
 
-The transitions are stored on disk as soon as they are made.  The distance of two records is the total variation of the outcomes of a
-state-action.
+The transitions are stored on disk as soon as they are made.  The transitions of one run are a record; the distance of two records is the
+total variation between the outcomes of a state-action, averaged over the state-actions.
 """
 
 from __future__ import annotations
@@ -114,8 +114,8 @@ def agents(task: Task, plant: Plant, seed: int) -> list[CuriousAgent]:
 def learn_offline(cell: Cell) -> dict[str, Any]:
     """Learn on the offline plant; the settings of the cell are `task` (name of a task) and `transitions` (number for each part).
 
-    Returns for each part "seen_<part>": transitions (T, 3): state, action, state reached; and "touched_<part>": (T,), whether each ended in
-    contact with an object of the world.
+    Returns for each part "seen_<part>": transitions (T, 3): state, action, state reached; and "touched_<part>": (T,), whether a transition
+    ended in contact with an object of the world.
     """
     task, number = TASKS[cell.settings["task"]], cell.settings["transitions"]
     plant = offline_plant(task, cell.seed)
@@ -156,8 +156,8 @@ def learn_live(task: str, robot: str, seed: int, transitions: int, folder: Path,
 def observed(folder: Path, task: str, number: int) -> dict[str, Any]:
     """Return the first `number` transitions of each part of a task that `learn_live` stored in `folder`; `task`: name of the task.
 
-    Returns for each part "seen_<part>": transitions (T, 3): state, action, state reached; and "touched_<part>": (T,), whether each ended in
-    contact with an object of the world.
+    Returns for each part "seen_<part>": transitions (T, 3): state, action, state reached; and "touched_<part>": (T,), whether a transition
+    ended in contact with an object of the world.
     """
     values: dict[str, Any] = {}
     for part in TASKS[task].parts:
@@ -196,7 +196,7 @@ Counts = Mapping[str, Ints]  # by part: number of each outcome, (S, A, S)
 
 @dataclass(frozen=True, slots=True)
 class Distance:
-    """The distance of two records of transitions, over the state-actions that both records tried often enough."""
+    """The distance of two records (the transitions of two runs), over the state-actions that both records tried often enough."""
 
     variation: float
     """Mean over the compared state-actions of the total variation between their outcomes in both records, 0 to 1."""
@@ -227,7 +227,7 @@ def shares(counts: Ints) -> Array:
 
 
 def distance(first: Counts, second: Counts, least: int) -> Distance:
-    """Return the distance between two records, over the state-actions of all parts that both tried at least `least` times.
+    """Return the distance of two records of transitions, over the state-actions of all parts that both tried at least `least` times.
 
     `first`, `second`: counts of outcomes (S, A, S) by part.  If there are no such state-actions, `variation` and `agree` are NaN and
     `compared` is 0.
@@ -241,7 +241,7 @@ def distance(first: Counts, second: Counts, least: int) -> Distance:
 
 
 def mean(distances: Sequence[Distance]) -> Distance:
-    """Return the mean of each number of several distances; the mean of `compared` is rounded."""
+    """Return a distance whose numbers are the means of the numbers of several distances; the mean of `compared` is rounded."""
     rows = np.array([(one.variation, one.agree, one.compared) for one in distances])
     variation, agree, compared = rows.mean(axis=0)
     return Distance(float(variation), float(agree), round(float(compared)))
@@ -249,10 +249,11 @@ def mean(distances: Sequence[Distance]) -> Distance:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Compared:
-    """How far the outcomes of a task on each live robot, and in each offline run, are from those of offline runs with other seeds.
+    """How far the outcomes of a task on each live robot, and in each offline run, are from those of other offline runs.
 
-    `live`: dict from a robot's name to its distance: the mean over the offline runs, where one offline run is left out in turn and the
-    distance is that from all the others together.  `offline`: for each offline run, its distance from all other offline runs together.
+    `live`: mean distance of each live robot, by name.  Each offline run is left out in turn, the distance of the robot from all other
+    offline runs together is computed, and these distances are averaged.  `offline`: for each offline run, its distance from all other
+    offline runs together.
     """
 
     live: dict[str, Distance]
@@ -264,8 +265,8 @@ class Compared:
 def compared(folder: Path, task: str, least: int) -> Compared:
     """Compare the outcomes that the live robots and the offline runs recorded for a task in the folder of an experiment's run.
 
-    `task`: "arms", "table" or "published".  `least`: tries that a state-action must have in both records.  Raises InvalidValue if fewer
-    than two offline runs have finished.
+    `task`: "arms", "table" or "published".  `least`: tries that a state-action must have on both sides of a comparison to be counted.
+    Raises InvalidValue if fewer than two offline runs have finished.
     """
     results = [r for r in load_cells(folder).values() if r.cell.settings["task"] == task]
     if len(results) < 2:
@@ -291,10 +292,10 @@ def compared(folder: Path, task: str, least: int) -> Compared:
 
 @dataclass(frozen=True, slots=True)
 class Contacts:
-    """Numbers of a part's actions.
+    """Counts of a part's actions, by how they ended.
 
     `missed`: actions that did not reach their goals.  `touching`: actions that ended in contact with an object of the world.  `both`:
-    actions that did both.  `actions`: all actions.
+    actions that missed their goals and ended in contact.  `actions`: all actions.
     """
 
     missed: int
@@ -317,9 +318,10 @@ class Contacts:
 
 
 def contacts(folder: Path, task: str) -> dict[str, dict[str, Contacts]]:
-    """Return a dict from the robot ("offline": all offline runs together) to a dict from the part to how its actions ended.
+    """Return how the actions of each part ended on each robot: a dict from the robot to a dict from the part to the counts.
 
-    `folder`: folder of the experiment's run.  `task`: "arms", "table" or "published".
+    The robot "offline" stands for all offline runs together.  `folder`: folder of the experiment's run.  `task`: "arms", "table" or
+    "published".
     """
     robot, found = load_robot(ROBOT), dict[str, dict[str, Contacts]]()
     results = [r.values for r in load_cells(folder).values() if r.cell.settings["task"] == task]
@@ -357,8 +359,8 @@ COLORS = {"pybullet": "tab:red", "mujoco": "tab:green", "kinematic": "tab:blue"}
 def draw_distances(tasks: Mapping[str, Compared], least: int) -> Any:
     """Draw the distances of live robots and offline runs, and the success of single actions, in one row of panels for each task.
 
-    `tasks`: the comparison by the name of the task.  `least`: tries that a state-action must have in both records.  Returns a Matplotlib
-    Figure.
+    `tasks`: the comparison by the name of the task.  `least`: tries that a state-action must have on both sides of a comparison to be
+    counted.  Returns a Matplotlib Figure.
     """
     drawing = new_figure(13.0, 4.2 * len(tasks))
     panels = drawing.subplots(len(tasks), 3, squeeze=False)

@@ -2,7 +2,7 @@
 """Counts of the transitions of a run: tries, failures, visits and ends.
 
 Transitions are (T, 3) integers, rows of state, action, state reached.  Counts of state-actions are (S, A), or (E,) for the E state-actions
-that exist, in the order of their rows in (S, A).
+that exist, in row-major order of (S, A).
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def in_order(seen: Ints) -> Ints:
 
 
 def goals_of(space: Lattice, seen: Ints) -> Ints:
-    """Return the goal state of the action of each transition, (T,).
+    """Return for each transition the goal state of its action, (T,).
 
     `seen`: transitions (T, 3), rows of state, action, state reached.
     """
@@ -148,7 +148,8 @@ Groups = dict[tuple[str, str], list[Explored]]  # values of two settings
 def explored(found: Mapping[str, CellResult], space_of: Callable[[str], Lattice], where: str, how: str) -> Groups:
     """Return the counts of the finished cells in groups: a list sorted by seed for each pair of values of the settings `where` and `how`.
 
-    `found`: cells by name, which recorded their transitions as "seen".  `space_of`: returns the space for a value of the setting `where`.
+    `found`: the finished cells (runs of a sweep) by name; each has its transitions as the value "seen".  `space_of`: returns the space for
+    a value of the setting `where`.
     """
 
     def of(result: CellResult) -> Explored:
@@ -187,7 +188,8 @@ def relative_tries_of(judged: Sequence[Explored], runs: Sequence[Explored]) -> l
 def draw_tries(axes: Any, tries: Ints, chosen: NDArray[np.bool_], width: float, label: str) -> None:
     """Draw the tries (E,) of every state-action as bars.
 
-    `chosen`: mask (E,) of the bars that are red, `width` wide and named `label` in the legend; the others are grey.  `axes`: of Matplotlib.
+    `chosen`: mask (E,) of the state-actions whose bars are red, `width` wide and named `label` in the legend; the others are grey.  `axes`:
+    of Matplotlib.
     """
     number = np.arange(len(tries))
     draw_heights(axes, np.where(chosen, 0, tries), color="0.6", label="others")

@@ -49,7 +49,7 @@ class Arrangement:
 
     @property
     def goals(self) -> list[int]:
-        """The numbers of the cells to which the cup is to be pushed.
+        """The indices of the cells to which the cup is to be pushed.
 
         These are all cells but the first cell of the cup and the cells nearest to the body, to which no hand can pull the cup.
         """

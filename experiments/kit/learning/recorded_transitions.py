@@ -22,8 +22,8 @@ class Record:
     """The transitions of one agent.
 
     `source`: the file of the transitions, relative to the run's folder.  `agent`: name of the agent; "" in a cell (one run of a sweep) with
-    one agent.  `settings`: settings of the agent, or of the cell.  `columns`: dict from a column's name to its list of plain values, all of
-    equal length.  A cell has only the columns n (number of the transition, from 1), s (state), a (action) and s_next (state reached).
+    one agent.  `settings`: settings of the agent, or of the cell.  `columns`: dict from a column's name to its values, a value for each
+    transition.  A cell has only the columns n (number of the transition, from 1), s (state), a (action) and s_next (state reached).
     """
 
     source: str

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Explorers of the literature for the agent of this library, and tabular worlds with rewards that the agent does not know in advance.
 
-Each explorer is a function as described at `mobee.learning.explorers.Explorer`.  Its plans use only the counts of the agent: an action that
-was never tried is believed to stay in its state.
+An explorer decides which action an agent takes; each one here is a function as described at `mobee.learning.explorers.Explorer`.  Its plans
+use only the counts of the agent: an action that was never tried is believed to stay in its state.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ PLAN_TOLERANCE = 1e-3  # of plans in sampled models
 
 
 class RewardedPlant(TabularPlant):
-    """A tabular world with rewards, which depend on state and action, and which the agent has to discover."""
+    """A tabular world (an MDP given by tables) with rewards that depend on state and action, and that the agent has to discover."""
 
     def __init__(self, world: TabularWorld, seed: int) -> None:
         states, actions = world.outcomes.shape[:2]
@@ -49,7 +49,10 @@ class RewardedPlant(TabularPlant):
 
 
 def learned(agent: Explorable) -> Any:
-    """Return the agent's transition model with probabilities from its counts alone; an action that was never tried stays in its state."""
+    """Return the agent's transition model with probabilities from its counts alone.
+
+    An action that was never tried is believed to stay in its state.
+    """
     return agent.model.debiased(goal=PRIOR, stay=0.0)
 
 
@@ -61,7 +64,10 @@ def row(values: Array, state: int) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Curious:
-    """The published curiosity with an external reward: the reward is the information gain plus `weight` times the rewards found so far."""
+    """The published curiosity with an external reward: the reward is the information gain plus `weight` times the external reward.
+
+    The external reward of an action is taken to be 0 before its first try.
+    """
 
     plant: RewardedPlant
     weight: float

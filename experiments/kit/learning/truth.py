@@ -30,8 +30,8 @@ CERTAIN = 0.9  # probability of the most likely outcome, below which an action i
 class Truth:
     """Measured frequencies of the outcomes of each state-action; a `mobee.learning.value_iteration.OutcomeModel`.
 
-    `outcomes`: (S, A, B), states reached.  `probabilities`: (S, A, B), their frequencies; 0 where there is no action or no try.  `tries`:
-    (S, A), number of tries.
+    `outcomes`: (S, A, B), the states reached, up to B for each state-action.  `probabilities`: (S, A, B), their frequencies; 0 in unused
+    entries, and where there is no action or no try.  `tries`: (S, A), number of tries.
     """
 
     outcomes: Ints

@@ -84,7 +84,7 @@ def draw(seed: int, services: Sequence[str], seconds: float, period: float) -> l
 
 
 def draw_around_stop(seed: int) -> list[Fault]:
-    """Draw the schedule of a seed: an emergency stop after 1 s, and two to five other faults, before or after the stop.
+    """Draw the schedule of faults of a seed: an emergency stop after 1 s, and two to five other faults, before or after the stop.
 
     The launcher, which is also the router, fails only after the stop: without a router no process would receive the stop, and `mobee estop`
     reports this.
@@ -103,7 +103,7 @@ def draw_around_stop(seed: int) -> list[Fault]:
 
 
 def shrunk(schedule: Sequence[Fault], fails: Callable[[Sequence[Fault]], bool], tries: int) -> list[Fault]:
-    """Return a shorter schedule that still fails: halves of the schedule, then single faults are left out.
+    """Return a schedule with fewer faults with which the system still fails: halves of the schedule, then single faults are left out.
 
     `fails`: performs a schedule and returns whether the system fails.  `tries`: largest number of calls of `fails`.
     """
@@ -127,11 +127,11 @@ def shrunk(schedule: Sequence[Fault], fails: Callable[[Sequence[Fault]], bool], 
 class FaultInjector:
     """Performs faults on the processes of one system.
 
-    The kinds: kill, freeze: the process is killed, or stopped for a time, by a signal.  throttle: it is stopped and continued every 50 ms.
-    disk: it cannot write a byte to a file.  files: it cannot open more files.  flood: one of `floods.FLOODS` is sent.  token: a liveliness
-    token with the name of a service is declared without a process.  duplicate: a second process of a service is started.  stop: an
-    emergency stop is sent.  Of FORGED, false_stop is an EStop message with `set = false`; release and arm are calls in the name of the
-    controller.
+    The kinds: kill: the process of a service is killed.  freeze: it is stopped for a time, by a signal.  throttle: it is stopped and
+    continued every 50 ms.  disk: it cannot write a byte to a file.  files: it cannot open more than 20 files.  flood: one of
+    `floods.FLOODS` is sent.  token: a liveliness token with the name of a service is declared without a process.  duplicate: a second
+    process of a service is started.  stop: an emergency stop is sent.  The kinds in FORGED must not release an emergency stop: false_stop
+    is an EStop message with `set = false`; release and arm are calls in the name of the controller.
     """
 
     def __init__(self, session: Any, endpoint: str, launcher: int | None = None, epoch: Callable[[], int | None] = lambda: None) -> None:

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Launches a live system of real processes, with or without a performer, and exchanges files with it."""
+"""Launches a live system of real processes, with or without a performer, and exchanges files with it.
+
+A performer is a service that calls a function of an experiment.  It reads what to do from a file (the job), and appends its results to
+another.
+"""
 
 from __future__ import annotations
 
@@ -41,7 +45,7 @@ def summary_of(
     runs: Path | None = None,
     watch: Callable[[int], None] = lambda pid: None,
 ) -> dict[str, Any]:
-    """Launch a scenario without monitor, wait for its end, and return its summary as a dict.  Raises LaunchFailed.
+    """Launch a scenario without monitor, wait for its end, and return the launcher's summary of the run as a dict.  Raises LaunchFailed.
 
     Args:
         scenario: name or path.
@@ -74,8 +78,8 @@ def summary_of(
 def launch_command(scenario: str, endpoint: str, runs: Path, settings: Sequence[str]) -> list[str]:
     """Return the command that launches a scenario without monitor.
 
-    `endpoint`: address of its router.  `runs`: folder in which its run folder is made.  `settings`: changes of the scenario, as
-    "FIELD=VALUE".
+    `endpoint`: address of the system's router.  `runs`: folder in which the folder of the run is made.  `settings`: changes of the
+    scenario, as "FIELD=VALUE".
     """
     argv = [sys.executable, "-m", "mobee_system", "launch", scenario, "--headless", "--json", "--endpoint", endpoint, "--runs", str(runs)]
     return [*argv, *(f"--set={setting}" for setting in settings)]
@@ -127,19 +131,22 @@ JOB, DONE = "job.json", "done.jsonl"
 
 
 def write_job(folder: Path, job: Struct) -> None:
-    """Make the folder and write the job, a msgspec Struct, to job.json; results of an interrupted launch are removed."""
+    """Make the folder and write the job, a msgspec Struct, to job.json; results of an interrupted launch are removed.
+
+    A job has what the function of a performer (a service that calls a function of an experiment) needs to know.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     (folder / DONE).unlink(missing_ok=True)
     (folder / JOB).write_text(encoded(job))
 
 
 def read_job(folder: Path, kind: type[T]) -> T:
-    """Return the job of type `kind` that `write_job` wrote into the folder."""
+    """Return the job of type `kind` that `write_job` wrote into the folder: what a function of an experiment is to do on the live robot."""
     return decoded((folder / JOB).read_text(), kind)
 
 
 def append_done(folder: Path, record: Struct) -> None:
-    """Append a result, a msgspec Struct, to done.jsonl in the folder; it is in the file when this function returns."""
+    """Append a result of a job, a msgspec Struct, to done.jsonl in the folder; it is in the file when this function returns."""
     with (folder / DONE).open("a") as file:
         file.write(encoded(record) + "\n")
 
@@ -200,7 +207,7 @@ def launch(
     lockstep: bool = True,
     simulator: Mapping[str, Any] = {},
 ) -> dict[str, Any]:
-    """Launch the live iCub with physics and a performer, wait for its end, and return its summary.  Raises LaunchFailed.
+    """Launch the live iCub with physics and a performer, wait for its end, and return the launcher's summary.  Raises LaunchFailed.
 
     The performer is a service that calls a function of an experiment.
 

@@ -83,7 +83,7 @@ class Drawn:
 
 
 class Drawer:
-    """Draws messages, requests and tokens; the same seed gives the same ones.
+    """Draws nearly valid messages, requests and liveliness tokens; the same seed gives the same ones.
 
     `parts`: number of motors of each part, by name.
     """
@@ -103,7 +103,7 @@ class Drawer:
         return self._drawn(cls.stream.key(name), cls, self._parts[part], call=False)
 
     def request(self) -> Drawn:
-        """Draw a request of a random call of the bus."""
+        """Draw the request of a random call (remote procedure) of the bus."""
         pattern, verb, cls = self._random.choice(self._calls)
         part = self._random.choice([*self._parts])
         key = pattern.replace("{verb}", verb).replace("{part}", part).replace("{service}", self._random.choice(SERVICES))
@@ -181,7 +181,7 @@ class Drawer:
 
 
 def send(endpoint: str, seed: int, count: int, parts: dict[str, int]) -> Counter[str]:
-    """Send `count` drawn messages, requests and tokens to a running system; returns the numbers sent: "messages", "calls", "tokens".
+    """Send `count` drawn messages, requests and tokens to a running system; returns how many were sent: "messages", "calls", "tokens".
 
     `endpoint`: address of the router.  `seed`: seed by which they are drawn.  `parts`: number of motors of each part, by name.
     """

@@ -29,12 +29,12 @@ _PATIENCE = 5.0  # s
 
 
 def inside(argv: Sequence[str]) -> list[str]:
-    """Return the command that runs the command `argv` in a new network namespace, in which it may make a `Network`."""
+    """Return the command that runs the command `argv` in a new network namespace, in which it is permitted to make a `Network`."""
     return ["unshare", "--net", "--map-root-user", "--", *argv]
 
 
 def refused() -> str:
-    """Return the reason why a user cannot make network namespaces and interfaces on this machine; "" if this is possible."""
+    """Return the reason why the present user cannot make network namespaces and interfaces on this machine; "" if this is possible."""
     program = "from experiments.kit.live.network import Network\nwith Network(0): pass"
     try:
         done = subprocess.run(inside([sys.executable, "-c", program]), capture_output=True, text=True, timeout=30.0)

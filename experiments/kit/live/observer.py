@@ -29,9 +29,10 @@ OLDEST = 0.1  # s between the beginning of a tick and of the last one in which a
 class Moment:
     """The state of a part at one tick.
 
-    `run`, `k`: the run and the number of the tick.  `t`: s, simulated time of the bus.  `at`: s, monotonic time of the machine.  `gate`:
-    state of the gate, the last check of commands before the motors, as "armed".  `mode`: kind of the command in force, as "hold".  `age`:
-    age of this command, in ticks.  `q`: measured positions of the part's motors, rad.  `speed`: rad/s, of the fastest motor.
+    `run`, `k`: identifier of the run, and number of the tick in it.  `t`: s, simulated time of the bus.  `at`: s, monotonic time of the
+    machine.  `gate`: state of the gate, the last check of commands before the motors, as "armed".  `mode`: kind of the command in force, as
+    "hold".  `age`: age of this command, in ticks.  `q`: measured positions of the part's motors, rad.  `speed`: rad/s, of the fastest
+    motor.
     """
 
     run: str
@@ -130,8 +131,8 @@ class Observer:
         """Return a dict from the part to its states so far, and the ages [s] of the commands obeyed; keep only the last state of each part.
 
         The age of a command is the time from the beginning of the tick that it answers to the beginning of the tick in which the robot
-        obeyed it. It is a lower bound: a tick is published after the gate has judged its command, and a busy machine may take long between
-        the two, so the beginning of the tick before is used.  States whose ticks were not received have no age.
+        obeyed it.  The returned age is a lower bound: it ends one tick earlier.  The reason is that a tick is published after the gate has
+        judged its command, and that a busy machine may take long between the two.  States whose ticks were not received have no age.
         """
         with self.lock:
             taken, self.parts = self.parts, {part: states[-1:] for part, states in self.parts.items()}
@@ -143,7 +144,7 @@ class Observer:
 
 @dataclass(frozen=True)
 class Stop:
-    """How a part came to rest after a fault; None: not within the given time.
+    """How a part came to rest after a fault; a number is None if this did not happen within the given time.
 
     `hold`, `rest`: s from the fault until the gate held the part, and until it was at rest.  `distance`: rad, largest motion of a motor
     until then.
@@ -188,9 +189,9 @@ def survived(changes: list[tuple[float, str, str]], fault: float, until: float) 
 
 
 def violations(states: Mapping[str, list[Moment]], robot: Robot, noise: float) -> list[str]:
-    """Return a line of text for each broken promise of the system in the states of one schedule of faults.
+    """Return a line of text for each broken guarantee of the system in the states that were recorded under one schedule of faults.
 
-    The promises: within a run time never decreases, and no motor is faster than the safety gate of robot_sim allows.  In lockstep, tick 0
+    The guarantees: within a run time never decreases, and no motor is faster than the safety gate of robot_sim allows.  In lockstep, tick 0
     may be repeated until all services have answered.  `states`: by part.  `noise`: largest error of the encoders, rad.
     """
     found = []
@@ -219,10 +220,10 @@ def too_old(ages: Sequence[float]) -> list[str]:
 
 @dataclass(frozen=True)
 class Kept:
-    """Numbers of the transitions of all agents on disk, compared with the published ones.
+    """Counts of the transitions of agents in a store on disk, compared with the published ones.
 
     `kept`: on disk.  `lost`: published, but not on disk.  `differing`: on disk with other values than published, or published twice with
-    different values.  `gaps`: numbers that occur twice on disk; a missing number raises MobeeError when the
+    different values.  `gaps`: transitions on disk with a number that another one has, too; a missing number raises MobeeError when the
     store is read.
     """
 
@@ -233,7 +234,7 @@ class Kept:
 
 
 def compare_transitions(observer: Observer, run_dir: Path, agents: list[str]) -> Kept:
-    """Compare the transitions that the agents published so far with those in the store of the run, and return the numbers.
+    """Compare the transitions that the agents published so far with those in the store of the run, and return the counts.
 
     `run_dir`: folder of the run.  `agents`: names of the agents that are compared; they may still be learning.
     """

@@ -19,7 +19,7 @@ COLUMNS = ("k", "pair", "depth")
 
 
 class Touch(Struct, frozen=True):
-    """A contact event: two shapes came into contact and separated again.
+    """A contact event: the time during which two shapes touched, with short interruptions.
 
     `pair`: names of the shapes.  `begin`, `end`: first and last tick.  `depth`: largest depth, m.
     """
@@ -43,7 +43,7 @@ def read_touches(path: Path, dt: float) -> list[Touch]:
 
 
 def touches(rows: Iterable[tuple[int, str, float]], gap: int) -> list[Touch]:
-    """Group contacts into events, and return the events in order of their beginning.
+    """Group contacts of single ticks into events, and return the events in order of their beginning.
 
     `rows`: tick, pair of shapes and depth [m] of each contact, in order of the ticks.  `gap`: number of ticks; a contact that comes more
     than `gap` ticks after the last contact of the same pair begins a new event.

@@ -26,8 +26,8 @@ _STATES = "state"  # folder of states
 class System:
     """A running system.
 
-    `process`: its launcher.  `endpoint`: address of its router.  `folder`: where run folder, error output and record of emergency stops
-    are.
+    `process`: its launcher.  `endpoint`: address of its router.  `folder`: where the folder of the run, the error output and the file with
+    the record of emergency stops are.
     """
 
     process: subprocess.Popen[str]

@@ -59,7 +59,10 @@ class Wire:
         return max(0.0, self._under_way[0][0] - time.monotonic()) if self._under_way else None
 
     def take(self, end: int) -> None:
-        """Read the packets that an interface has sent, at most 64, and apply the faults; `end`: file descriptor of the interface."""
+        """Read the packets that an interface has sent, at most 64, and lose or delay them as `faults` says.
+
+        `end`: file descriptor of the interface.
+        """
         for _ in range(_AT_ONCE):
             try:
                 packet = os.read(end, _LARGEST)

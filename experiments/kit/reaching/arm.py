@@ -2,9 +2,9 @@
 """The reaching right arm: robot, control laws, states, plants, learned transitions, and the model of a planner.
 
 The four joints of the published lattice move; the wrist and the fingers are rigid at home.  `reach_space`, `reach_plant` and
-`learned_beliefs` are the published set-up (thesis 8.3): the robot of 2014, under either law, with equidistant neighbours.  The functions
-with an argument `law` (except `reach_plant`) belong to the experiments that compare with planners: today's robot under the law "default",
-or the robot of 2014 under the law "published", with the 16 nearest states as neighbours.
+`learned_beliefs` are the published set-up (thesis 8.3): the robot of 2014, under either law, with actions to the states one level away
+along one joint.  The functions with an argument `law` (except `reach_plant`) belong to the experiments that compare with planners: today's
+robot under the law "default", or the robot of 2014 under the law "published", with actions to the 16 nearest states.
 """
 
 from __future__ import annotations
@@ -77,9 +77,10 @@ def reach_plant(seed: int, law: str = "published") -> OfflinePlant:
 
 
 def learned_beliefs(plant: OfflinePlant, seed: int, transitions: int = TRANSITIONS) -> OutcomeModel:
-    """Return the transition model that a curious agent learns on the plant without a target; reaching does not change it (thesis 8.1).
+    """Return the transition model that a curious agent learns on the plant without a target.
 
-    `seed`: seed of the agent and its start.  `transitions`: number of transitions that the agent makes.
+    Learning to reach does not change this model (thesis 8.1).  `seed`: seed of the agent and its start.  `transitions`: number of
+    transitions that the agent makes.
     """
     space = reach_space()
     begin_anywhere(space, plant, seed)
@@ -90,13 +91,16 @@ def learned_beliefs(plant: OfflinePlant, seed: int, transitions: int = TRANSITIO
 
 @cache
 def body(law: str = "default") -> Robot:
-    """Return today's robot for the control law "default", the robot of 2014 for the law "published"; every call returns the same object."""
+    """Return the robot for a control law: today's robot file "icub" for "default", that of 2014, "icub_2014", for "published".
+
+    Every call returns the same object.
+    """
     return published_robot() if law == "published" else mobee.load_robot("icub")
 
 
 @cache
 def space(law: str = "default") -> Lattice:
-    """Return the 81 states of the right arm's four joints with the 16 nearest states as neighbours.
+    """Return the 81 states of the right arm's four joints with actions from each state to the 16 nearest ones.
 
     `law`: "default" with today's robot, or "published" with the robot of 2014.  Every call returns the same object.
     """
@@ -144,7 +148,7 @@ def arm_plant(seed: int, world: World | None = None, motors: MotorParameters | N
 
 
 def arm_belief(world: World | None = None, cables: bool = True, turns: Array | None = None, law: str = "default") -> PeerBelief:
-    """Return the model of a planner for the right arm.
+    """Return the model of robot and world with which a planner plans motions of the right arm.
 
     `world`: as the planner believes it to be; None: empty.  `cables`: whether it knows the cable constraints.  `turns`: (4,) rad, believed
     minus measured joint angles; None: 0.  `law`: "default" with today's robot, or "published" with the robot of 2014.
@@ -177,8 +181,8 @@ def reach_agent(plant: ReachPlant, model: TransitionModel, seed: int, law: str =
 def straight_paths(pairs: Sequence[tuple[int, int]], points: int = 21) -> Array:
     """Return poses on straight paths between states of the right arm, (pairs, points, 4) rad; `points`: number of poses on each path.
 
-    `pairs`: numbers of the first and the last state of each path, which leads from the first state's sample (the pose that stands for the
-    state) to the last state's sample.
+    `pairs`: indices of the first and the last state of each path.  A path leads from the first state's sample, the pose that stands for the
+    state, to the last state's sample.
     """
     samples, shares = space().samples, np.linspace(0.0, 1.0, points)[:, None]
     found: Array = np.array([samples[a] + shares * (samples[b] - samples[a]) for a, b in pairs])
@@ -197,7 +201,7 @@ class Errors:
 
 
 class JudgedPlant(WrappedPlant[OfflinePlant]):
-    """An offline plant with wrong encoders and eyes: control uses their readings, but results of reaches are measured in the true poses.
+    """An offline plant with errors of its encoders and eyes: control uses their readings, but reaches are judged in the true poses.
 
     Args:
         plant: the plant that moves.
@@ -235,7 +239,7 @@ class JudgedPlant(WrappedPlant[OfflinePlant]):
     def go(self, part: str, target: Array, marker: str) -> Outcome:
         """Perform an action, as `act` does, but without a force of the target on the marker's hand.
 
-        The planner itself keeps the hand away from the target.
+        For planners, which keep the hand away from the target by their plans.
         """
         return self._reported(self.inner.act(part, target, reaching=marker))
 

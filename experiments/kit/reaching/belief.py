@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The model of robot and world that the planner peer uses: sound poses and motions, inverse kinematics, and RRT-Connect.
+"""The model of robot and world of `PlannerPeer`: which poses and motions are allowed (sound), inverse kinematics, and RRT-Connect.
 
 Inverse kinematics: damped least squares from many start poses, all at the same time (Wampler 1986); `kit.reaching.targets.nearest_pose`
 searches one nearest pose.  Paths: OMPL's RRT-Connect (Kuffner and LaValle 2000), and shortcuts of its paths (Geraerts and Overmars 2007).
@@ -68,7 +68,7 @@ class PeerBelief:
         self._exempt = self._hand()
 
     def present(self, target: ReachTarget) -> None:
-        """Put the target into the believed world, in place of an earlier one."""
+        """Put the target into the believed world, in place of the earlier target, if there is one."""
         world = self.model.world
         if TARGET in world.objects:
             world.remove(TARGET)
@@ -92,7 +92,7 @@ class PeerBelief:
         A sound pose is within the limits of the motors, away from the poses in `blocked`, fulfils every clause (a condition on several
         motor positions, as the shoulder's cables impose), and has no forbidden contact.  `care`: the contacts that are forbidden; "solids":
         all contacts of solids; "grasping": these, except contacts of the hand with the target; "fields": contacts of solids and of
-        repulsive fields, except those of the hand's fields with the target.  `checked` is increased by P.
+        repulsive fields, except those of the hand's fields with the target.  The counter `checked` is increased by P.
         """
         self.checked += len(q)
         poses = self.whole(q)
@@ -103,8 +103,8 @@ class PeerBelief:
     def sound_motion(self, start: Array, end: Array, care: Care = "solids") -> bool:
         """Return whether all poses on the straight path from `start` to `end` (d,) rad are sound; the start pose is not checked.
 
-        "Sound" and the values of `care`, the set of forbidden contacts, are explained at `PeerBelief.sound`.  `checked` is increased by the
-        number of checked poses.
+        "Sound" and the values of `care`, the set of forbidden contacts, are explained at `PeerBelief.sound`.  The counter `checked` is
+        increased by the number of checked poses.
         """
         count = max(1, int(np.ceil(np.abs((end - start) / self.span).max() / STEP)))
         shares = np.arange(1, count + 1)[:, None] / count
@@ -169,9 +169,10 @@ def goals(
 ) -> tuple[Array, Array]:
     """Return sound poses with the marker on the target, and for each of them a pose away from the target, (K, d) rad each; K may be 0.
 
-    From the pose away from the target the hand moves straight to the target.  The poses are sorted by the forces of the fields (volumes
-    that repel), the smallest first.  `rng`: for the random starts of the search.  `most`: largest number of poses.  `free`: return only
-    poses in which no joint limit exerts a force; if it is false, other poses are returned if there are no such poses.
+    `PeerBelief` defines "sound".  From the pose away from the target the hand moves straight to the target.  The poses are sorted by the
+    forces of the fields (volumes that repel), the smallest first.  `rng`: for the random starts of the search.  `most`: largest number of
+    poses. `free`: True: return only poses in which no joint limit exerts a force; False: return other poses, too, if there are no such
+    poses.
     """
     within = target.radius if target.aim == "surface" else 0.0
     trials = ((belief.limits, ARRIVED), (belief.range, ARRIVED), (belief.range, ALMOST))
@@ -266,11 +267,11 @@ class _Careful(NamedTuple):
 def rrt_connect(
     belief: PeerBelief, start: Array, ends: Array, seed: int, care: Care = "solids", extensions: int = EXTENSIONS
 ) -> Array | None:
-    """Return the waypoints (k, d) rad of a sound path from a sound pose to one of several poses; None if none was found.
+    """Return the waypoints (k, d) rad of a sound path from a sound pose to one of several poses; None if no path was found.
 
-    `PeerBelief` defines "sound".  `start`: (d,) rad.  `ends`: (G, d) rad.  `seed`: seed of the random search.  `care`: the contacts that
-    are forbidden: "solids", "grasping" or "fields", explained at `PeerBelief.sound`.  `extensions`: largest number of extensions of the
-    trees. Raises OmplMissing.
+    `PeerBelief` defines "sound".  `start`: (d,) rad, the first pose.  `ends`: (G, d) rad, the poses of which one is to be reached.  `seed`:
+    seed of the random search.  `care`: the contacts that are forbidden: "solids", "grasping" or "fields", explained at `PeerBelief.sound`.
+    `extensions`: largest number of extensions of the trees. Raises OmplMissing.
     """
     sound, sound_motion = partial(belief.sound, care=care), partial(belief.sound_motion, care=care)
     checker = _Careful(belief.range[:, 0], belief.span, belief.limits, sound, sound_motion)

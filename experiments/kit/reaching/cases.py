@@ -72,7 +72,7 @@ class Case:
 
 
 def make_cases(scene: str, count: int, seed: int, law: str = "default", free: bool = False) -> list[Case]:
-    """Draw `count` random cases of a kind; raises InvalidValue if too few are found.
+    """Draw `count` random cases (target, start pose, obstacle) of a kind; raises InvalidValue if too few are found.
 
     The targets are drawn from those of `touchable_targets`.  In a start pose no solid touches anything.  `scene`: "free", "around",
     "against", "between" or "moving", as explained at SCENES.  `seed`: seed of the draws.  `law`: "default" with today's robot, or
@@ -154,10 +154,11 @@ REACHES = {"published": 1, "default": 3}  # per case; the thesis reached once
 
 @dataclass(frozen=True, slots=True)
 class Attempt:
-    """The result of an attempt.
+    """The result of one attempt to bring the palm to a target.
 
-    `missing`: distance of the palm from the target's surface at the end [m].  `seconds`: plant time.  `thinking`: processor time for plans
-    [s]. `reward`: thesis eq. 8.4, of the distance from the point at which the control law aims (centre or surface).
+    `missing`: distance of the palm from the target's surface at the end [m].  `seconds`: duration in time of the plant [s].  `thinking`:
+    processor time for plans [s]. `reward`: thesis eq. 8.4, of the distance from the point at which the control law aims (centre or
+    surface).
     """
 
     missing: float

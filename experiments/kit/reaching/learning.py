@@ -68,13 +68,13 @@ def learn(
     repetitions: int,
     sets: Mapping[str, Sequence[ReachTarget]],
 ) -> dict[str, Any]:
-    """Let an agent learn from `problems`, and evaluate it on each of the named `sets` at the `checkpoints`, which are numbers of tries.
+    """Let an agent learn from `problems`, and evaluate it on each of the named `sets` after each number of tries in `checkpoints`.
 
-    Returns arrays by name.  A problem-try is one attempt to reach one target.  For each of the T problem-tries, (T,): `problem`: number of
-    the target; `reach_state`: state from which the agent reached, -1 if it did not; `reward`; `actions`: number of actions; `duration` [s].
-    `failures` (S, A): number of failures of each transition.  For each set NAME, with L evaluations of R = `repetitions` repetitions of P
-    problems: `rewards_NAME` (L, R, P): rewards of the reaches, 0 without a reach; `states_NAME` (L, R, P): states from which the agent
-    reached, -1 without a reach; `blocked_NAME` (L,): number of failed transitions.
+    Returns arrays by name.  A problem-try is one attempt to reach one target.  For each of the T problem-tries, (T,): `problem`: index of
+    the target in `problems`; `reach_state`: state from which the agent reached, -1 if it did not; `reward`; `actions`: number of actions;
+    `duration` [s].  `failures` (S, A): number of failures of each transition.  For each set NAME, with L evaluations of R = `repetitions`
+    repetitions of P problems: `rewards_NAME` (L, R, P): rewards of the reaches, 0 without a reach; `states_NAME` (L, R, P): states from
+    which the agent reached, -1 without a reach; `blocked_NAME` (L,): number of failed transitions.
     """
     tries: list[Try] = []
     found: dict[str, list[Evaluation]] = {name: [] for name in sets}
@@ -125,7 +125,7 @@ def _of_tries(tries: Sequence[Try], shape: tuple[int, ...]) -> dict[str, Any]:
 
 
 class Course:
-    """A single try by plans on any plant and for any target, also a moving one, as in an evaluation (thesis 8.3.3); learns nothing.
+    """One try to reach a target by plans, as in an evaluation (thesis 8.3.3), on any plant; the target may move.  The agent learns nothing.
 
     The part moves to the state with the highest expected reward of reaching.  Within the try, it avoids transitions that failed, and states
     from which reaches missed.
@@ -136,8 +136,8 @@ class Course:
         worth: function that returns the expected reward (S,) of reaching for a target (3,) m from each state.
         where: function that returns the present position of the target, (3,) m, root frame.
         rng: for the choice among equally good actions.
-        apart: after a missed reach, states within this distance of its state are avoided, too: the sum over the motors of the differences
-            as shares of their ranges.
+        apart: after a missed reach, states within this distance of the state of the reach are avoided, too.  The distance of two states is
+            the sum over the motors of the differences, each as a share of the motor's range.
     """
 
     def __init__(

@@ -2,9 +2,9 @@
 """The planner with which reach learners are compared: inverse kinematics and RRT-Connect, executed through MoBeE.
 
 The planner has a belief about robot and world (`kit.reaching.belief`), which may differ from the plant, and it plans again after every
-change.  If a motion does not end as planned, the planner avoids that pose and plans again from where the arm is.  With a memory it avoids
-the pose in later tries, too: always, or, if the target was touched there, only for this target, as thesis 9.4.1 distinguishes body and
-workspace.
+change.  If a motion does not end as planned, the planner avoids that pose and plans again from where the arm is.  A planner with a memory
+avoids the pose in later tries, too.  If the target was touched there, it avoids the pose only for this target, else for all targets, as
+thesis 9.4.1 distinguishes workspace and body.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ Knowledge = tuple[list[Array], dict[bytes, list[Array]]]
 class PeerMemory:
     """The poses of the motors, (d,) rad, that the planner avoids, because motions were blocked there or reaches missed.
 
-    Poses in which the target was touched, or with which the target was missed, are avoided only for this target, all others always (thesis
-    9.4.1).  `span`: (d,) rad, widths of the motors' ranges.
+    Poses in which the target was touched, or in which it was missed, are avoided only for this target; all other poses are always avoided
+    (thesis 9.4.1).  `span`: (d,) rad, widths of the motors' ranges.
     """
 
     def __init__(self, span: Array) -> None:
@@ -56,8 +56,8 @@ class PeerMemory:
     def blocked(self, aim: Array, end: Array, target: ReachTarget, touched: bool) -> None:
         """Record that a motion to the pose `aim` ended in another pose `end`, both (d,) rad, and avoid a pose near its end.
 
-        The avoided pose lies on the line from `end` to `aim`, at the distance 0.08, where each motor's difference is a share of its range;
-        or it is `aim` if that is nearer.  `touched`: whether the target was touched; the pose is then avoided only for this target.
+        The avoided pose lies on the line from `end` to `aim`, at the distance 0.08 from `end` in units of the motors' ranges; or it is
+        `aim` if that is nearer.  `touched`: whether the target was touched; the pose is then avoided only for this target.
         """
         left = (aim - end) / self._span
         ahead = end + min(1.0, NEAR / max(float(np.linalg.norm(left)), 1e-9)) * (aim - end)
@@ -71,7 +71,7 @@ class PeerMemory:
         self._at_target.setdefault(place_of(target), []).append(pose)
 
     def of(self, target: ReachTarget) -> tuple[Array, Array]:
-        """Return two arrays of poses to avoid for a target, (B, d) rad each: all of them, and those avoided for this target only."""
+        """Return the poses to avoid for a target: all of them, (B, d) rad; and those that are avoided for this target only, (C, d) rad."""
         here = self._at_target.get(place_of(target), [])
         everything, alone = (np.array(poses).reshape(-1, len(self._span)) for poses in (self._always + here, here))
         return everything, alone
@@ -101,8 +101,8 @@ class PeerPlans:
         """Return a path from the pose `here` (d,) rad to a target: its corners (k, d) rad, and the pose (d,) rad at the target.
 
         The last corner is the pose before the target, from which the hand moves straight to it.  If the poses that `memory` avoids leave no
-        path, new goal poses are drawn; if there is still none, avoided poses are ignored, first those for all targets.  Returns None if
-        this does not help either.
+        path, new goal poses are drawn.  If there is still no path, avoided poses are ignored: first those that are avoided for all targets,
+        then the others.  Returns None if there is no path even then.
         """
         belief = self._belief
         belief.present(target)

@@ -19,7 +19,7 @@ from mobee.vision.calibration.self_calibration import NOISE, JointOffsets, SelfC
 
 
 class Judge(ReachPlant, Protocol):
-    """A plant that knows the true position of the hand.
+    """A plant that knows the true position of the hand, and so can judge reaches of plants with wrong encoders.
 
     `reached`: the true position of the marker at the end of the last reach, (3,) m, root frame.
     """
@@ -32,9 +32,10 @@ class Judge(ReachPlant, Protocol):
 
 
 class SeenHand:
-    """What a learner knows by seeing its hand: `offsets`, the estimated errors of the encoders of some motors.
+    """What a learner knows by seeing its hand.
 
-    They are kept when the world changes.  `is_seen`: whether the hand is seen at present.
+    `offsets`: the estimated errors of the encoders of some motors, which are kept when the world changes.  `is_seen`: whether the hand is
+    seen at present.
     """
 
     def __init__(self, robot: Robot, motors: Sequence[str], seed: int) -> None:
@@ -48,14 +49,14 @@ class SeenHand:
         return judge.marker_at(MARKER) + error if self.is_seen else None
 
     def correct(self, judge: Judge) -> JudgedSeeingPlant:
-        """Return a plant that acts by `judge`, and corrects the encoders by the position at which the hand is seen."""
+        """Return a plant that acts through the plant `judge`, and corrects the encoders by the positions at which the hand is seen."""
         return JudgedSeeingPlant(SelfCalibratingPlant(judge, self.offsets, lambda: self.see(judge)), judge)
 
 
 class JudgedSeeingPlant(WrappedPlant[SelfCalibratingPlant]):
     """A self-calibrating plant whose reaches are judged by the true position of the hand, as those of other learners are.
 
-    `judge`: the plant inside, which knows the true position.
+    `inner`: the self-calibrating plant.  `judge`: the plant through which it acts, which knows the true position.
     """
 
     def __init__(self, inner: SelfCalibratingPlant, judge: Judge) -> None:

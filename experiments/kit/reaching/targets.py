@@ -139,7 +139,7 @@ def distances(places: Array, joints: tuple[str, ...]) -> list[float]:
 
 
 def counts(found: list[float]) -> tuple[int, int]:
-    """Return how many targets have a centre that the palm can reach, and how many a surface that it can reach within 2 cm.
+    """Return the number of targets whose centre the palm can reach, and of those whose surface it can approach to within 2 cm.
 
     `found`: least distance of the palm from the centre of each target, m.
     """
@@ -173,7 +173,7 @@ def touchable(belief: PeerBelief, target: ReachTarget, free: bool = True) -> boo
 
 
 def table() -> str:
-    """Return a Markdown table of the distances of all targets, and one of the numbers of targets that can be reached."""
+    """Return a Markdown table of the distances of all targets, and one that counts the targets that can be reached."""
     lines = ["| joints | targets | palm at the centre | palm within 2 cm of the surface |", "| --- | --- | --- | --- |"]
     each = {}
     for count in (len(RIGHT), 7):

@@ -7,8 +7,10 @@ The arm has two links on a shoulder of three joints, with the ranges of the iCub
 squares, by at most half a radian per joint; its start pose is noisy.  Targets are balls, and most actions whose path passes through the
 target fail.
 
-The command prints a table by predictor and strategy.  Each row has the rewards of an evaluation on the 27 targets as a fraction of the
-oracle's, after each number of problem-tries; the same on eight targets between them that are never tried, after 800; and the learning time.
+The command prints a table by predictor and strategy.  Each row has three kinds of numbers.  First the rewards of an evaluation on the 27
+targets, after each number of problem-tries (attempts to reach one target), as a fraction of the rewards of an oracle, an agent that knows
+the true rewards.  Then the same fraction on eight targets between them that are never tried, after 800 problem-tries.  Last the learning
+time [s].
 """
 
 from __future__ import annotations
@@ -50,7 +52,7 @@ def hands(poses: Array) -> Array:
 
 
 def missing(starts: Array, target: Array, ranges: Array) -> Array:
-    """Return the remaining errors (...) m of reaches for a target (3,) m, relative to the shoulder.
+    """Return the remaining errors (...) m of reaches for a target at a position (3,) m, relative to the shoulder.
 
     `starts`: (..., 4) rad, poses in which the reaches start.  `ranges`: (4, 2) rad, of the joints.
     """
@@ -72,9 +74,9 @@ def jacobians(poses: Array) -> Array:
 
 
 def swept(starts: Array, ends: Array, point: Array, clearance: float) -> NDArray[np.bool_]:
-    """Return which straight motions bring the arm within `clearance` [m] of a point (3,) m, and nearer than at the start, (S, A).
+    """Return which straight motions bring the arm within `clearance` [m] of a point (3,) m, and nearer to it than at the start, (S, A).
 
-    `starts`: (S, 4) rad.  `ends`: (S, A, 4) rad.  The point is relative to the shoulder.
+    `starts`: (S, 4) rad.  `ends`: (S, A, 4) rad, the A ends of the motions from each start.  The point is relative to the shoulder.
     """
     shares = np.linspace(0.0, 1.0, WAYPOINTS)[:, None]
     upper, fore = _links(starts[:, None, None] + shares * (ends - starts[:, None])[:, :, None])
@@ -217,7 +219,7 @@ def blocked(target: Array) -> NDArray[np.bool_]:
 
 @cache
 def grid() -> list[ReachTarget]:
-    """Return 27 targets: three x, three y and three z, which are quantiles of the palm positions in random poses."""
+    """Return 27 targets: three x, three y and three z, which are quantiles of the palm positions in random poses; z changes fastest."""
     low, high = _ranges().T
     reached = hands(np.random.default_rng(0).uniform(low, high, size=(4000, 4)))
     axes = np.quantile(reached, QUANTILES, axis=0).T
@@ -276,9 +278,10 @@ ROWS = (
 def scores(predictor: str, strategy: str, failures: str, seed: int, checkpoints: Sequence[int] = CHECKPOINTS) -> tuple[Array, float]:
     """Return the rewards of a learner as fractions of the oracle's: on the 27 targets at each checkpoint (L,), and on eight other targets.
 
-    `predictor`, `strategy`, `failures`: arguments of `ReachAgent`.  `seed`: seed of arm and learner.  `checkpoints`: L numbers of
-    problem-tries (attempts to reach one target), ascending.  The learner never tries the eight other targets; it is evaluated on them after
-    800 problem-tries; the second result is NaN if 800 is no checkpoint.
+    `predictor`, `strategy`, `failures`: arguments of `ReachAgent`.  `seed`: seed of arm and learner.  The oracle is an agent that knows the
+    true rewards.  `checkpoints`: (L,), after how many problem-tries (attempts to reach one target) the learner is evaluated, ascending.
+    The learner never tries the eight other targets; it is evaluated on them after 800 problem-tries; the second result is NaN if 800 is no
+    checkpoint.
     """
     problems, unseen = grid(), np.nan
     agent = toy_agent(ToyArm(seed), seed, predictor, strategy, failures)

@@ -37,7 +37,7 @@ BLOCKED = 0.5  # share of failed tries from which a transition counts as blocked
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tried:
-    """Measured results of one target.
+    """Results of trying every reach and every transition with one target in the world.
 
     `missing`: (S, n) m, remaining errors of n tries to reach from each state; NaN for tries that were not made.  `made`, `failed`: (S, A),
     number of tries of each transition, and of those that did not end in its goal.
@@ -54,7 +54,7 @@ class Tried:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Truth:
-    """Measured results of T targets.
+    """Results of trying every reach and every transition with each of T targets in the world, one at a time.
 
     `places`: (T, 3) m, root frame.  `missing`: (T, S, n) m, remaining errors of n tries to reach; NaN where a state was not entered.
     `blocked`: (T, S, A), share of the tries of each transition that failed; NaN without tries.
@@ -86,9 +86,9 @@ def load_truth(path: Path) -> Truth:
 
 
 def truth_of(measured: Mapping[tuple[float, ...], Mapping[str, Any]]) -> Truth:
-    """Return the results of several targets.
+    """Return the measured results of several targets as one object.
 
-    `measured`: a dict from the position of a target (3,) m to the values of its cell, as `Tried.values` returns them.
+    `measured`: a dict from the position of a target (3,) m to the values of its cell (one run of a sweep), as `Tried.values` returns them.
     """
     each = list(measured.values())
     made = np.array([one["made"] for one in each])
@@ -100,7 +100,7 @@ def truth_of(measured: Mapping[tuple[float, ...], Mapping[str, Any]]) -> Truth:
 def measure(place: Array, law: str = "published", tries: int = TRIES, seed: int = SEED) -> Tried:
     """Try every reach and every transition `tries` times, with the target at a place (3,) m, root frame, and return the results.
 
-    `law`: "published" or "default"; the robot is that of 2014.  `seed`: seed of the plant and of random choices.
+    `law`: control law, "published" or "default"; the robot is that of 2014 under both.  `seed`: seed of the plant and of random choices.
     """
     target = ReachTarget(place, aim=laws()[law].aim)
     return _Measuring(reach_space(), reach_plant(seed, law), target, tries, seed).run()
@@ -210,7 +210,8 @@ Enter = Callable[[int], bool]  # goes to a state, and returns whether it was ent
 def remaining_errors(plant: ReachPlant, space: Space, targets: Sequence[ReachTarget], enter: Enter | None = None) -> Array:
     """Make one reach from each of the S states for each of the T targets; returns the remaining errors, (T, S) m.
 
-    NaN where the state was not entered.  The plant moves.  `enter`: function that brings it to a state; None: by up to three actions.
+    NaN where the state was not entered.  The plant moves.  `enter`: function that brings the plant to a state, and returns whether it was
+    entered; None: by up to three actions.
     """
     enter = enter or partial(_entered, plant, space)
     missing = np.full((len(targets), len(space)), np.nan)
@@ -229,7 +230,7 @@ def failed_transitions(plant: ReachPlant, space: Space, tries: int, enter: Enter
     """Try each transition without a target, and return the share of the tries that did not end in its goal, (S, A).
 
     `tries`: number of tries of each transition.  Tries that could not be made, because a state was not entered, count as successes.
-    `enter`: as of `remaining_errors`.
+    `enter`: function that brings the plant to a state; None: by up to three actions.
     """
     enter = enter or partial(_entered, plant, space)
     rng = np.random.default_rng(0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Starts the performer: `python -m experiments.kit.live.performer`."""
+"""Starts the performer, a service that calls a function of an experiment: `python -m experiments.kit.live.performer`."""
 
 from __future__ import annotations
 

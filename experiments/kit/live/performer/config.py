@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Settings of the performer."""
+"""Settings of the performer, a service that calls a function of an experiment."""
 
 from __future__ import annotations
 
