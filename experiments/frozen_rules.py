@@ -29,10 +29,11 @@ Rules = dict[str, dict[str, Any]]  # "claims": published values by text; "consta
 
 
 def rules_of(name: str) -> Rules:
-    """Return the rules of an experiment: "claims": published numbers by the claim's text; "constants": values by name, as JSON has them.
+    """Return the rules of an experiment as JSON values, under two keys.
 
-    The constants are the numbers, texts and collections of them in its module, and in the modules of `experiments.claims` that this module
-    imports whole.
+    "claims": dict from the text of each claim to its published number.  "constants": dict from the name of each public constant to its
+    value: the numbers, texts and collections of them in the experiment's module, and in those modules of `experiments.claims` that it
+    imports as modules.
     """
     module = importlib.import_module(EXPERIMENTS[name])
     imported = [one for one in vars(module).values() if isinstance(one, ModuleType) and one.__name__.startswith("experiments.claims.")]

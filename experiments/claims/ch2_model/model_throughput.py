@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Model throughput: evaluations per second while a thread edits the world without a pause (thesis Algorithm 1, FLOOD_MODEL).
 
-Claim: while every joint moves and one thread removes and creates boxes as fast as it can, in growing numbers, the model gives consistent
-results hundreds of times per second for the iCub among hundreds of boxes, and more often for the Katana.  Source: thesis 2.4, figure 2.4.
-Published: "hundreds of poses per second for a humanoid with hundreds of obstacles" on a dual-core 2.4 GHz laptop; the figure's curves are
-not given as numbers.  Run time: three to five minutes for the whole algorithm, 1000 numbers of objects with 1000 removals and creations
-each, for both robots.
+Claim: every joint moves, and one thread removes and creates boxes as fast as it can, while the number of boxes in the world grows from 1 to
+1000.  Meanwhile the model is evaluated, with consistent results, hundreds of times per second for the iCub among hundreds of boxes, and
+more often for the Katana.  Source: thesis 2.4, figure 2.4.  Published: "hundreds of poses per second for a humanoid with hundreds of
+obstacles" on a dual-core 2.4 GHz laptop; the figure's curves are not given as numbers.  Run time: three to five minutes for both robots,
+with 1000 removals and 1000 creations at each number of boxes.
 
-`--check` runs an endurance test instead: several threads add, move, remove, attach, detach and change roles in one world while the model
-evaluates; no evaluation may see a half-made edit, nothing may raise, memory must stay constant.
+`--check` runs an endurance test instead: several threads add, move, remove, attach and detach objects of one world, and change their roles,
+while the model is evaluated.  No evaluation may see an incomplete edit, no exception may be raised, and the memory must stay constant.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Measure the throughput for each robot, from where the run in `folder` was stopped; with --check, run the endurance test instead.
+    """Measure the throughput for each robot, and continue a run that was stopped in `folder`; with --check, run the endurance test instead.
 
     Returns a dict from the robot to the rates of evaluations and edits, as in `results`; with --check the counts and "passed" of the
     endurance test, as in `model_throughput_endurance.endure`.
@@ -181,11 +181,11 @@ def read_flood(path: Path) -> list[Record]:
 
 
 def results(records: list[Record], arguments: argparse.Namespace) -> dict[str, Any]:
-    """Return the measured rates by robot, and under "complete" whether every robot had as many objects as the option --objects asks for.
+    """Return a dict from the robot to its measured rates, and under "complete" whether every robot was measured up to --objects objects.
 
-    Keys for each robot: "evaluations_per_second_flooded" and "evaluations_per_second_still", dicts from a number of objects to the rate
-    with and without edits; "edits_per_second"; "objects_reached", the largest number of objects; and "note", only if the edits lasted less
-    than MIN_SECONDS (0.2 s).  `arguments`: the options of the run.
+    Keys of each robot: "evaluations_per_second_flooded" and "evaluations_per_second_still", dicts from a number of objects to the rate with
+    and without edits; "edits_per_second"; "objects_reached", the largest number of objects; and, only if the edits lasted less than
+    MIN_SECONDS (0.2 s), "note", a text that says that this is too short for a rate.  `arguments`: the options of the run.
     """
     found: dict[str, Any] = {}
     for robot in arguments.robots:
@@ -205,7 +205,7 @@ def results(records: list[Record], arguments: argparse.Namespace) -> dict[str, A
 
 
 def rates(records: Iterable[Record]) -> Iterator[tuple[int, int]]:
-    """Yield pairs of a number of objects and evaluations per second, near each of the numbers 0, 1, 2, 5, 10, ... 1000 (NUMBERS).
+    """Yield pairs (number of objects, evaluations per second), one for each of the numbers 0, 1, 2, 5, 10, ... 1000 (NUMBERS).
 
     A number that was not measured is left out.  Records within 10 % of the number are pooled.  If they last less than MIN_SECONDS (0.2 s),
     the next nearest records are added; if the mean number of objects then differs by more than 10 %, this mean is yielded instead of the

@@ -54,9 +54,9 @@ MIN_SECONDS = 60.0  # s, shortest time for a slope
 class Editor:
     """Edits a world at random from one thread: objects of its own, and objects that all threads share.
 
-    It knows the state of its own objects, so none of the edits of these may be refused.  `edits`: number of edits.  `refused`: number of
-    refused edits of shared objects, which are allowed.  Two of its objects are witnesses of the order of edits: the editor always moves the
-    first one by a step, then the second.
+    It makes only valid edits of its own objects, so the world may refuse none of them.  `edits`: number of edits.  `refused`: number of
+    refused edits of shared objects; these refusals are allowed.  Two of its own objects are witnesses of the order of edits: the editor
+    always moves the first one by a step, then the second.
 
     Args:
         world, robot: the world to edit, and the robot to whose links objects are attached.
@@ -153,8 +153,8 @@ def witnesses(number: int) -> tuple[str, str]:
 def out_of_order(objects: Mapping[str, WorldObject], threads: int) -> str | None:
     """Check that the edits of each thread are seen in the order in which they were made.
 
-    `objects`: a snapshot of the world, by name.  `threads`: number of threads.  Returns a text that names the first thread with wrong
-    order; None if all are right.
+    A thread moves the first of its two witnesses (see `witnesses`) always before the second.  `objects`: the objects of one snapshot of the
+    world, by name.  `threads`: number of threads.  Returns a text that names the first thread with wrong order; None if all are right.
     """
     for number in range(threads):
         first, second = (round(objects[name].position[0] / STEP) for name in witnesses(number))
@@ -181,7 +181,7 @@ class WatchedWorld(World):
 
 
 def torn_table(snapshot: Snapshot) -> str | None:
-    """Return a text that says how the tables of a snapshot differ from its objects (they are torn); None if they agree exactly.
+    """Return a text that says how the tables of a snapshot contradict its objects (then the snapshot is torn); None if they agree exactly.
 
     A snapshot is an unchanging copy of the world.  The compared tables are the names, the roles, the names of attached objects, and the
     numbers that describe the volumes.  All objects must be boxes.

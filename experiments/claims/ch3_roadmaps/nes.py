@@ -5,11 +5,11 @@ Claim: NES is in many ways comparable to CMA, and outperforms CMA on some tasks.
 time: 3 minutes on 2 cores.
 
 A task is a function (sphere, ellipsoid and cigar of condition 1e6, Rosenbrock) of 10, 20 or 41 dimensions, rotated; each run has its own
-rotation and its own start in [-1, 1], the same for all strategies, and standard deviation 0.5.  The evaluations until f < 1e-8 are counted;
-a run that does not reach this counts as 400 000.  Strategies: xNES and SNES as published (Glasmachers 2010, Schaul 2011), the library's
-default (xNES with CMA-ES's path, weights and rates), and CMA-ES by its author, all with their default populations.  "Outperforms on some
-tasks": fewer evaluations on at least one of the twelve tasks, by confidence intervals with a twelfth of the error rate each (Bonferroni).
-"Comparable": at most 1.5 times as many evaluations, median of the tasks.
+rotation and its own start in [-1, 1], the same for all strategies; the initial standard deviation is 0.5.  The evaluations until f < 1e-8
+are counted; a run that does not reach this counts as 400 000.  Strategies: xNES and SNES as published (Glasmachers 2010, Schaul 2011), the
+library's default (xNES with CMA-ES's path, weights and rates), and CMA-ES by its author, all with their default populations.  "Outperforms
+on some tasks": fewer evaluations on at least one of the twelve tasks, by confidence intervals with a twelfth of the error rate each
+(Bonferroni).  "Comparable": the evaluations over those of CMA-ES, median over the tasks, are at most 1.5.
 """
 
 from __future__ import annotations
@@ -69,9 +69,9 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def evaluations(found: Cells) -> Runs:
-    """Return the numbers of evaluations that the searches needed, by strategy and task, (seeds,) each, in the order of the seeds.
+    """Return a dict from (strategy, task) to how many evaluations each of its searches needed, (seeds,), in the order of the seeds.
 
-    A task is a pair of a function's name and a number of dimensions.
+    A task is a pair: the name of a function, and the number of dimensions.
     """
     by_condition = runs_by(found, lambda result: float(result.values["evaluations"]), "strategy", "function", "dimensions")
     return {(key[0], (key[1], key[2])): np.array(values) for key, values in by_condition.items()}

@@ -5,11 +5,11 @@ Claim: NES outperforms the other optimisation approaches at solving inverse kine
 Published: no numbers.  Run time: 3 minutes on 2 cores.
 
 The targets are poses (position and rotation) of the right palm in random postures among 100 boxes; a solution is within 5 mm and 5 degrees
-and has no contact.  Either all 41 motors may move, or the 10 of torso and arm.  All solvers have the same cost.  Each ends at its first
-good pose, restarts by its own criterion if it makes no progress, and stops without success after 20 000 evaluations.  NES as in
-`solve_ik(method="nes")`; xNES as published (Glasmachers 2010); CMA-ES (package cma, a generation at once); simulated annealing; a particle
-filter.  The evaluations per target are counted, including targets without success: "outperforms" means fewer than the rival.  Each seed has
-its own targets.  Times are processor time of one core.
+and has no contact.  Either all 41 motors may move, or the 10 of torso and arm.  All solvers minimise the same cost.  A solver ends at its
+first good pose, restarts by its own criterion if it makes no progress, and stops without success after 20 000 evaluations.  The solvers are
+the library's NES, as in `solve_ik(method="nes")`; xNES as published (Glasmachers 2010); CMA-ES (package cma), which evaluates a whole
+generation in one batch; simulated annealing; and a particle filter.  The evaluations per target are counted, also for targets that are not
+reached; "outperforms" means fewer evaluations than the rival.  Each seed has its own targets.  Times are processor time of one core.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Solve the inverse kinematics of the targets of this seed, one after another, with the solver and motors that the settings name.
 
     Returns arrays (targets,): "reached", whether a pose was found; "evaluations", number of evaluations of the model; "ms", processor time.
-    `settings`: "solver", its name; "motors", a key that says which motors may move; "targets", their number.
+    `settings`: "solver", its name; "motors", how many motors may move, 41 or 10; "targets", number of targets.
     """
     model, name, count = _model(), settings["solver"], settings["targets"]
     motors = MOTORS if settings["motors"] == FEW else None
@@ -79,7 +79,7 @@ def _model() -> Model:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solver:
-    """Results of one solver with one number of motors: means over the targets of each seed, (seeds,).
+    """Results of one solver with 41 or 10 moving motors: arrays (seeds,) of means over the targets of each seed.
 
     `reached`: share of the targets.  `evaluations`: number per target.  `ms`: processor time per target.
     """
@@ -96,7 +96,7 @@ Solvers = Mapping[tuple[str, int], Solver]  # by solver and number of motors
 
 
 def solvers(found: Cells) -> Solvers:
-    """Return the results by solver and number of motors; within each, the values are in the order of the seeds."""
+    """Return a dict from (solver, number of motors) to the results; their values are in the order of the seeds."""
     groups = grouped_by(found, "solver", "motors")
     columns = ("reached", "evaluations", "ms")
     return {key: Solver(*(np.array([float(run[name].mean()) for run in runs]) for name in columns)) for key, runs in groups.items()}

@@ -5,13 +5,14 @@ Claim: when the ball is made solid, "the planner/controller immediately finds th
 4.7.  Published: no number; aim of this reproduction: the new path under way within 200 ms of the bump, live, on robot_sim's clock.  Run
 time: 6 minutes on 2 cores, in real time.
 
-The map has three poses of the right arm of `icub`, at the right of a ball, at its left, and above it; the path from right to left is
-shorter through the ball than over it.  The real processes run with PyBullet (with --backend mujoco: MuJoCo), in free mode, with ticks of 10
-ms and the default law at full speed.  Each crossing begins with a new map; 0.1 to 1.2 s after its start the ball becomes an obstacle in the
-model, and a body in the simulator.  Bump: the first tick at which the model reports contact of the arm with the ball, fields included; the
-motion ends there, the edge is removed, and the arm moves on to the next vertex of the new path at once.  Under way: the first tick in which
-a command computed after the new goal is in force.  Also measured: when the joints stop approaching the old goal, which depends on the
-control law.
+The roadmap has three poses of the right arm of `icub`: at the right of a ball, at its left, and above it.  The path from right to left
+through the ball is shorter than the path over it.  The real processes run with PyBullet (with --backend mujoco: MuJoCo), with ticks of 10
+ms that follow the clock (free mode), and the default control law at full speed.  A crossing is a motion from right to left, and begins with
+a new roadmap; 0.1 to 1.2 s after its start the ball becomes an obstacle in the model, and a body in the simulator.  The bump is the first
+tick at which the model reports a contact of the arm, solids or fields, with the ball.  There the motion ends, the edge is removed, and the
+arm moves at once to the next vertex of the new path.  The new path is under way from the first tick in which a command that was computed
+after the request of this vertex is in force.  Also measured: when the joints stop approaching the old goal, which depends on the control
+law.
 """
 
 from __future__ import annotations
@@ -125,13 +126,13 @@ def _crossings(folder: Path) -> list[Measures]:
 
 
 class Measures(Struct, frozen=True):
-    """Measurements of one crossing.
+    """Measurements of one crossing: a motion of the arm from the right of the ball to its left.
 
-    `bumped`: whether the arm touched the ball on the short path.  `command`: time [ms] from the bump until the first command computed after
-    the new goal is in force.  `turn`: time [ms] from the bump until the joints stop approaching the old goal.  Both are -1 without a bump.
-    `on`: vertices to which the arm moved, in order.  `arrived`: whether the arm reached the other side.  `seconds`: duration.  `deepest`:
-    depth [m] of the deepest solid contact with the ball, by the simulator.  `thinking`: processor time [ms] from the end of the failed
-    motion to the request of the next.
+    `bumped`: whether the arm touched the ball on the short path.  `command`: time [ms] from the bump until a command that was computed
+    after the request of the new goal is in force.  `turn`: time [ms] from the bump until the joints stop approaching the old goal.  Both
+    are -1 without a bump.  `on`: goal vertex of each motion, in order, also of motions that ended early.  `arrived`: whether the arm
+    reached the other side.  `seconds`: duration.  `deepest`: depth [m] of the deepest solid contact with the ball, by the simulator.
+    `thinking`: processor time [ms] from the end of the failed motion to the request of the next motion.
     """
 
     bumped: bool
@@ -147,7 +148,7 @@ class Measures(Struct, frozen=True):
 def measure(folder: Path) -> list[Measures]:
     """Compute the measures of each crossing of a launch from its recording, write them into its folder, and return them in order.
 
-    A launch is one run of the system, with a few crossings.  `folder`: folder of the launch.
+    A launch is one start of the live system, with a few crossings.  `folder`: folder of the launch.
     """
     q = read_positions(folder, robot())
     touches = [touch for touch in read_touches(folder / CONTACTS, 1.0 / RATE) if BALL in touch.pair]
@@ -171,7 +172,8 @@ def read_measured(folder: Path) -> list[Measures]:
 def keep_poses(folder: Path) -> None:
     """Save poses of the first crossing of a launch (one run of the system) for pictures, in poses.npz of its folder.
 
-    It contains `q` (T, n) rad, `times` (T,) s, and the times [s] `solid` (the ball becomes solid) and `bump` (the arm touches it).
+    The file contains `q` (T, n) rad, `times` (T,) s from the start of the crossing, and the times [s] `solid` (the ball becomes solid) and
+    `bump` (the arm touches the ball).
     """
     q, crossing = read_positions(folder, robot()), read_done(folder, Crossing)[0]
     ticks = np.arange(crossing.motions[0].asked, crossing.motions[-1].ended, EVERY)

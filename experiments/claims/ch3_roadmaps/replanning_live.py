@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The crossings of the experiment `replanning` on the live robot: the scene, a map of three poses around a ball, and the performer."""
+"""The crossings of the experiment `replanning` on the live robot: the scene, a roadmap of three poses around a ball, and the motions."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def new_map() -> AdaptiveRoadmap:
 
 
 def model() -> Model:
-    """Return a model of the robot and its world, where the ball is a ghost: it exerts no force."""
+    """Return a model of the robot and its world, in which the ball is a ghost, an object that exerts no force."""
     return Model(robot(), load_world(str(WORLD)))
 
 
@@ -66,7 +66,10 @@ def ball() -> Array:
 
 
 class Job(Struct, frozen=True):
-    """The crossings that a launch makes.  `after`: for each, the time [s] after its start at which the ball becomes solid."""
+    """The crossings of one launch (start of the live system).
+
+    `after`: for each crossing, the time [s] from its start until the ball becomes solid.
+    """
 
     after: list[float]
 
@@ -74,9 +77,10 @@ class Job(Struct, frozen=True):
 class Acted(Struct, frozen=True):
     """A motion of the arm along an edge of the roadmap.
 
-    Ticks are those of robot_sim.  `vertex`: the goal.  `asked`: tick of the request.  `commanded`: tick in which a command computed after
-    the request was first in force.  `bump`: tick at which the model first reported that the arm touches the ball; -1: never.  `ended`: tick
-    at which the end was received.  `thinking`: processor time [s] between the end of the motion before and this request.
+    Ticks are those of the simulator, robot_sim.  `vertex`: the goal.  `asked`: tick of the request.  `commanded`: first tick in which a
+    command that was computed after the request was in force.  `bump`: tick at which the model first reported that the arm touches the ball;
+    -1: never.  `ended`: tick at which the end of the motion was received.  `thinking`: processor time [s] from the end of the previous
+    motion to this request.
     """
 
     vertex: int
@@ -120,7 +124,7 @@ def perform(service: Service, folder: Path) -> None:
 
 
 def cross_undisturbed(crosser: Crosser, after: float) -> Crossing:
-    """Make a crossing whose ball becomes solid after `after` s.  A hold interrupts it, and then the crossing is repeated."""
+    """Make a crossing whose ball becomes solid after `after` s; repeat the crossing if a hold (a safe stop) interrupts it."""
     while True:
         try:
             return crosser.cross(after)
@@ -131,8 +135,8 @@ def cross_undisturbed(crosser: Crosser, after: float) -> Crossing:
 class Crosser:
     """A plant that moves the right arm, records its motions and makes the ball solid during a crossing.
 
-    A `Walker`, which follows the edges of a roadmap, commands it.  `motions`: the motions of the present crossing.  `hand`: the plant that
-    moves the arm.
+    In a crossing a `Walker`, which follows the edges of a roadmap, acts through this plant.  `motions`: the motions of the present
+    crossing.  `hand`: the plant that moves the arm on the live robot.
     """
 
     def __init__(self, service: Service, hand: ContactStopPlant) -> None:
@@ -203,9 +207,9 @@ class Crosser:
 class ContactStopPlant(BusPlant):
     """A BusPlant whose actions end when the model reports that the part begins to touch one of some objects.
 
-    Such an action ends early and not settled.  In lockstep a part in motion receives no ticks.  Therefore a second service of the same
-    process, the watcher, takes part in every tick.  It answers a tick after the forces of that tick have been processed, so that decisions
-    on them fall into the same tick.
+    Such an action ends early, and its outcome is not settled.  In lockstep (every tick waits for all participants) the plant receives no
+    ticks while its part moves.  Therefore a second service of the same process, the watcher, takes part in every tick.  It answers a tick
+    when the plant has processed the forces of that tick, so that the plant reacts to them in the same tick.
 
     Args:
         service, robot, part: see BusPlant.

@@ -6,12 +6,13 @@ infeasible edges are removed when they are found, until the feasible sub-graph i
 "approximately 90 minutes" at 10 % of maximum velocity; "small, randomly generated graphs often contain unreachable vertices and edges".
 Run time: a minute on 2 cores offline; `--live` about 15 minutes more.
 
-Seven joints of the right arm of `icub` at its table under the default law, at 10 % speed; on the offline plant with the identified motors,
-and with `--live` also by the real processes in lockstep with PyBullet.  A vertex is reached within 0.15 rad in every joint; after a failed
-edge the arm moves back.  Targets are drawn in proportion to untried edges; when no untried edge can be reached any more, RRT-Connect plans
-a path to a vertex with untried edges, up to three times per vertex.  Every tried edge is then tried once more from rest at its vertex, by
-another plant, to see whether both agree.  Solid contacts of the simulator's list of pairs are measured offline by the model, from the true
-joints every 0.1 s, and live by PyBullet, every tick.
+Seven joints of the right arm of `icub` move beside its table, at 10 % speed under the default control law.  The robot is the offline plant,
+with motor parameters that were identified on PyBullet; with `--live` also the real processes, in lockstep with PyBullet.  A vertex counts
+as reached when every joint is within 0.15 rad of it; after a failed edge the arm moves back.  The next target is a vertex, drawn in
+proportion to its number of untried edges.  When no untried edge can be reached any more, RRT-Connect plans a path to a vertex with untried
+edges, up to three times per vertex.  At the end another plant tries every tried edge once more, from rest at its vertex, to see whether the
+results agree.  The depths of solid contacts count only for the pairs that the simulator tests; offline the model measures them, from the
+true joint positions every 0.1 s, and live PyBullet, in every tick.
 """
 
 from __future__ import annotations
@@ -127,11 +128,12 @@ class Depth:
 
 
 def explored(seed: int, most: int | None = None) -> dict[str, Any]:
-    """Explore the roadmap of a seed on the offline plant, with at most `most` motions along edges (None: until all are known).
+    """Explore the roadmap of a seed on the offline plant, with at most `most` motions along edges (None: no limit).
 
-    Returns the map and its observations with the keys of `outcome`, and: "finished", whether all is known; "why", the text of the error
-    that ended the exploration, "" without one; "minutes", robot time [min] at the end of each motion; "deepest", depth [m] of the deepest
-    solid contact, and "pair", the names of its two shapes; "agree" (E,), for each tried edge whether another try had the same result.
+    Returns the map and its observations with the keys of `outcome`, and: "finished", whether all reachable edges were tried; "why", the
+    text of the error that ended the exploration, "" without one; "minutes", robot time [min] at the end of each motion; "deepest", depth
+    [m] of the deepest solid contact, and "pair", the names of its two shapes; "agree" (E,), for each of the E tried edges whether another
+    try had the same result.
     """
     plant = offline_plant(seed)
     depth, search = Depth(plant), explorer(plant, seed)
@@ -152,7 +154,8 @@ def outcome(roadmap: AdaptiveRoadmap, repairs: int) -> dict[str, Any]:
     """Return a roadmap with V vertices and at most A edges from each, and its observations, as a dict of arrays.
 
     "samples" (V, 7) rad: poses of the vertices.  "goals" (V, A): goal of each edge, -1 for no edge.  "tried" (V, A): number of tries.
-    "feasible" (V, A): whether the last try ended at the goal.  "repairs": number of paths from single queries.
+    "feasible" (V, A): whether the last try ended at the goal.  "repairs": number of paths that a planner (RRT-Connect) has added to the
+    map.
     """
     beliefs, space = roadmap.beliefs, roadmap.space
     return {"samples": space.samples, "goals": space.goals, "tried": beliefs.tried, "feasible": roadmap.feasible, "repairs": repairs}
@@ -161,8 +164,8 @@ def outcome(roadmap: AdaptiveRoadmap, repairs: int) -> dict[str, Any]:
 def agreement(roadmap: AdaptiveRoadmap, seed: int) -> Array:
     """Try each tried edge once more from rest at its vertex, on a new offline plant, and return which results are the same as before.
 
-    The result (E,) has a value for each of the E tried edges: True if the new try ended like the last one, at the goal or elsewhere.
-    `seed`: of the encoder noise.
+    The array (E,) has a value for each of the E tried edges, by vertex and then by edge: True if both this try and the last one of the
+    exploration reached the goal, or both did not.  `seed`: of the encoder noise.
     """
     plant, space = offline_plant(seed), roadmap.space
     same = []
@@ -254,9 +257,9 @@ def _touched(launches: Sequence[Path]) -> dict[str, Any]:
 def read_live(folder: Path) -> dict[str, Any] | None:
     """Return the roadmap and the measures of the live exploration in `folder`; None if it is not finished.
 
-    Keys: those of `outcome`; "finished", whether all edges are known; "hours", robot time; "touches", solid contacts; "deepest", depth [m]
-    of the deepest one, and "pair", the names of its shapes; "agree" (E,), for each tried edge whether another try on the offline plant had
-    the same result; "edges", number of tried edges.
+    Keys: those of `outcome`; "finished", whether all reachable edges were tried; "hours", robot time; "touches", number of solid contacts;
+    "deepest", depth [m] of the deepest one, and "pair", the names of its shapes; "agree" (E,), for each tried edge whether another try on
+    the offline plant had the same result; "edges", number of tried edges.
     """
     if not (folder / DONE).exists():
         return None
@@ -280,8 +283,8 @@ def findings(found: Cells, live: Mapping[str, Any] | None = None) -> dict[str, A
     """Return the results of all cells (explorations, one for each seed) and of the live exploration.
 
     Keys: "maps", a dict from "seed N" or "live" to a row of the roadmap: minutes of robot time, numbers of edges, repairs and unreached
-    samples (poses of vertices), deepest solid contact, and others; "claims", a list with the judged claims, as dicts (`Claim.record`).
-    `live`: the result of `read_live`; None: not explored live.
+    samples (the random poses of the map), depth of the deepest solid contact, and others; "claims", a list with the judged claims, as dicts
+    (`Claim.record`). `live`: the result of `read_live`; None: not explored live.
     """
     results = sorted(found.values(), key=lambda result: result.cell.seed)
     rows = {f"seed {result.cell.seed}": _row(result.values) for result in results}

@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""TRM: coverage and validity of the task-relevant roadmaps of thesis figures 3.1 to 3.11 and 4.8, by evolution and by least squares.
+"""TRM: coverage and validity of the task-relevant roadmaps of thesis figures 3.1 to 3.11 and 4.8, built by evolution and by least squares.
 
 Claim: the framework produces maps for all these tasks: poses that meet the task's constraints, spread over its task space, in one graph.
 Source: thesis 3.3, 3.4 and 4.3.  Published: figures only, about 5000 poses for figure 4.8.  Run time: about 5 minutes a seed on 2 cores.
 
-The tasks are in trm_tasks.py.  The reachable part of a task's box is found independently: by least squares on a lattice of half the spacing
-with many starts per point, and by random starts at random points.  Such a point counts as covered if a vertex of the map is within a
-spacing of it.  Every pose is checked by python-fcl.  `python -m experiments.claims.ch3_roadmaps.trm_pictures NAME` builds one map and draws
-it.
+The tasks are in trm_tasks.py; the box of a task is the range of its coordinates, and the spacing is the distance between neighbouring
+vertices of a roadmap in the task space.  The part of the box that the robot can reach is found independently of the roadmap: by least
+squares on a lattice of half the spacing with many starts per point, and by random starts at random points.  A reachable point counts as
+covered if a vertex of the map is within a spacing of it.  python-fcl checks the contacts of every pose.  `python -m
+experiments.claims.ch3_roadmaps.trm_pictures NAME` builds one map and draws it.
 """
 
 from __future__ import annotations
@@ -56,7 +57,8 @@ MAX_OFFSET = 0.05  # of a pose from such a point, in spacings
 class Coverage:
     """How well the vertices of a roadmap cover the task space.
 
-    `reachable`: task points (R, m) that the robot can reach.  `far`: (R,) distance of each from its nearest vertex, in spacings.
+    `reachable`: task points (R, m) that the robot can reach, in the units of the m task coordinates.  `far`: (R,) distance of each point
+    from its nearest vertex, in spacings (distances between neighbouring vertices of the roadmap).
     """
 
     reachable: Array
@@ -86,9 +88,10 @@ def reachable(
     """Return a dense set of task points that the robot can reach, (R, m).
 
     Most points are found by least squares on a lattice of half the spacing, with many more starts per point than a roadmap uses.  Others
-    are found by random starts at random points, which do not depend on neighbours.  `costs`: what each pose must satisfy.  `spacing`: of
-    the map, (m,).  `motors`: those that may move, None: all.  `start`: pose (n,) rad of all motors, at which the other motors stay; None:
-    home.  `margin`: distance [rad] of the poses from the motors' limits.  `seed`: of the random numbers.
+    are found from random starts at random points, so that they do not depend on poses of neighbouring points.  `costs`: what each pose must
+    satisfy.  `spacing`: distance between neighbouring vertices of the roadmap along each task coordinate, (m,).  `motors`: those that may
+    move, None: all.  `start`: pose (n,) rad of all motors, at which the other motors stay; None: home.  `margin`: distance [rad] of the
+    poses from the motors' limits.  `seed`: of the random numbers.
     """
     rng = np.random.default_rng(seed)
     problem = Problem(model, costs, start, motors, margin)
@@ -99,7 +102,8 @@ def reachable(
 def coverage(points: Array, y: Array, spacing: Array) -> Coverage:
     """Return how well the vertices `y` (V, m) of a roadmap cover reachable task points.
 
-    `points`: (R, m) task points; the vertices are added.  `spacing`: of the map, (m,).
+    `points`: (P, m) reachable task points; the vertices are added to them, because they are reachable too.  `spacing`: distance between
+    neighbouring vertices of the roadmap along each task coordinate, (m,).
     """
     points = np.concatenate([points, y])
     far, _ = cKDTree(y / spacing).query(points / spacing)
@@ -117,8 +121,9 @@ def valid(
 ) -> NDArray[np.bool_]:
     """Return for each pose `q` (V, n) rad whether it is valid, (V,).
 
-    A valid pose meets the tolerances of all `costs`, the motors' limits and the box of the task, is at its task point in `y` (V, m), and
-    moves only `motors` (None: all) away from the pose `start` (None: home).  Contacts are computed by python-fcl, not by the compiled core.
+    A valid pose meets the tolerances of all `costs`, is within the motors' limits and within the box of the task (the range of its
+    coordinates), has the task coordinates of its row of `y` (V, m), and differs from the pose `start` (None: home) only in `motors` (None:
+    all).  Contacts are computed by python-fcl, not by the compiled core.
     """
     reference = mobee.Model(solid_robot(model.robot), model.world, engine="fcl")
     pose = reference.evaluate(q)
@@ -230,9 +235,10 @@ def results(folder: Path) -> dict[str, Any]:
 def built(example: Example, method: Method, seed: int) -> dict[str, Any]:
     """Build the roadmap of an example with this method ("nes" or "least_squares"), and return its measures and the map itself.
 
-    Measures: "vertices" and "evaluations", numbers; "processor_s" and "wall_s"; "valid", share of valid poses; "kept", number of edges over
-    the number of edges to nearest neighbours; "free", share of edges without contact; "connected", share of vertices in the largest
-    component.  The map: "q" (V, n) rad, "y" (V, m), "edges" (E, 2) and "spacing" (m,).  `seed`: of the search.
+    Measures: "vertices" and "evaluations", numbers; "processor_s" and "wall_s"; "valid", share of valid poses; "kept", number of edges of
+    the map over the number of edges that join all vertices to their nearest neighbours; "free", share of edges without contact;
+    "connected", share of vertices in the largest component.  The map: "q" (V, n) rad, "y" (V, m), "edges" (E, 2) and "spacing" (m,).
+    `seed`: of the search.
     """
     start, wall = time.process_time(), time.perf_counter()
     roadmap = build(example, method, seed)

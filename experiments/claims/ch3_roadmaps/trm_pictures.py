@@ -112,7 +112,7 @@ def _moving_parts(example: Example) -> tuple[str, ...]:
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Build and draw the roadmap of each task that the command line names; a roadmap with a file in the folder of --out is read instead.
+    """Draw the roadmap of each task that the command line names; build it first, unless its file is in the folder of --out.
 
     `argv`: command-line arguments; None: those of the process.  Raises SystemExit with the text of an error of the library.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The tasks of thesis figures 3.1 to 3.11 and 4.8, a function for each.  A task file to copy is in docs/roadmaps.md."""
+"""The tasks of thesis figures 3.1 to 3.11 and 4.8, one function for each task.  docs/roadmaps.md has a task file that you can copy."""
 
 from __future__ import annotations
 

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Babbling: collisions and completed commands under random position moves of 23 motors at 20 % speed, at a table (thesis 4.1.1).
 
-Claim: without MoBeE the robot hits itself and the table hundreds of times in two hours; with MoBeE it never does, and the second
-MoBeE completes more of the commands, and more smoothly, than the first.  Source: thesis 4.1.1; published: "approximately two
-hours over several trials of 5 to 20 minutes each with joint velocity limited to 20% of maximum ... MoBeE effectively prevented all
-of them", on the robot.  Here: the PyBullet robot (with --backend mujoco MuJoCo's), every process in lockstep, postures uniform over
-the whole ranges of torso (3 motors), head with eyes (6) and arms without hands (7 each), the same sequence in all modes.  A command is
-a posture of one part; it is completed when all its motors end within 10 degrees, returned when the part ends where it began, else
-deflected.
+Claim: without MoBeE the robot hits itself and the table hundreds of times in two hours; with MoBeE it never does, and the second MoBeE
+completes more of the commands, and more smoothly, than the first.  Source: thesis 4.1.1; published: "approximately two hours over several
+trials of 5 to 20 minutes each with joint velocity limited to 20% of maximum ... MoBeE effectively prevented all of them", on the robot.
+Here: the PyBullet robot (with --backend mujoco: MuJoCo's), with all processes in lockstep (every tick waits for all of them).  The postures
+are uniform over the whole ranges of torso (3 motors), head with eyes (6) and arms without hands (7 each), and their sequence is the same in
+all modes: without MoBeE, with MoBeE 1.0 and with MoBeE 2.0.  A command is a posture of one part.  It is completed if all motors of the part
+end within 10 degrees of it, returned if the part ends within 5 degrees of where it began, and else deflected.
 
-Run time: 2 h of robot time in each of three modes take about an hour; an interrupted run continues with --resume.
+Run time: about an hour for 2 h of robot time in each of the three modes; --resume continues an interrupted run.
 """
 
 from __future__ import annotations
@@ -200,7 +200,7 @@ def verdict(rows: Rows) -> dict[str, bool]:
 def share(row: Mapping[str, Any], count: str) -> float:
     """Return a count as a share of the commands, in [0, 1]; 0 if there are no commands.
 
-    `row`: a result of `summarise`.  `count`: a key of it.
+    `row`: a result of `summarise`.  `count`: a key of it with a count, as "completed".
     """
     return float(row[count] / row["commands"]) if row["commands"] else 0.0
 
@@ -300,7 +300,7 @@ def figure(folder: Path) -> Path:
 
 
 def plot(rows: Rows) -> Any:
-    """Return a figure of collisions by pair and by depth, of the outcomes of the commands, and of the roughness of the motion.
+    """Return a figure of collisions by pair and by depth, of the outcomes of the commands, and of the jerk of the motion.
 
     `rows`: a dict from the mode ("off", "one", "two": without MoBeE, MoBeE 1.0, MoBeE 2.0) to the result of `summarise`.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One trial of `babbling`: commands, a new system of real processes in lockstep that executes them, and the measurements."""
+"""One trial of `babbling`: random commands, a new live system in lockstep that executes them, and the measurements."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class PositionMove:
 
 
 class Commanded(Struct, frozen=True, forbid_unknown_fields=True):
-    """A posture that was commanded to all parts at once.
+    """A posture that was commanded to all parts at once, and how this command ended.
 
     `begin`: tick of the command.  `end`: tick at which its outcome is judged.  `target`: positions of all motors [rad].  `endings`: how the
     command ended, by part: "over" (its time has passed), "settled", "timeout" or "refused" (ended by the safety layer).
@@ -207,12 +207,13 @@ def _size(path: Path) -> int:
 
 
 class Judged(Struct, frozen=True):
-    """A command and its outcome.
+    """The outcome of a posture that was commanded to all parts at once.
 
     `outcomes`: by part; "completed": the part came within 10 degrees of its target; "returned": it did not, and ended within 5 degrees of
     its start; "deflected": it ended elsewhere.  `endings`: by part, how the command ended: "over" (its time has passed), "settled",
-    "timeout" or "refused" (ended by the safety layer).  `left`: by part, the largest remaining error of a motor [rad].  `duration`: [s].
-    `path`: length of the path, summed over all motors [rad].  `way`: the same for the straight path to the target [rad].
+    "timeout" or "refused" (ended by the safety layer).  `left`: by part, the largest remaining error of a motor [rad].  `duration`: from
+    the command to the tick at which it is judged [s].  `path`: length of the path of each motor, summed over the 23 motors that babble
+    [rad].  `way`: the same for the straight path to the target [rad].
     """
 
     outcomes: dict[str, Outcome]
@@ -243,7 +244,7 @@ class _Summary(Struct):
 
 
 class Trial(Struct, frozen=True):
-    """The measurements of one trial.
+    """The measurements of one trial.  Those of motors are over the 23 motors that babble.
 
     `seconds`: robot time [s].  `commands`: outcomes of all commands.  `touches`: contacts of solids.  `beyond`: largest distance of a motor
     beyond a limit [rad], negative inside; `motor`: its name.  `speed_squared` and `jerk_squared`: means over ticks and motors, in (rad/s)^2

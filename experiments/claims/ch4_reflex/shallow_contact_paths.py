@@ -34,7 +34,7 @@ HIGHEST_START = 0.15  # m, of the palm
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Spot:
-    """A place at which the left hand just touches the table's field, and the direction of the paths through it.
+    """A place at which the left hand just touches the table's field, and the horizontal direction of the paths through this place.
 
     The table's field is the zone around the table in which the hand's fields, larger volumes that are not solid, overlap the table.  `q`:
     posture there, (n,) rad.  `position` (3,) m and `rotation` (3, 3): pose of the palm, root frame.  `heading`: horizontal unit vector
@@ -49,10 +49,10 @@ class Spot:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HandPath:
-    """A path of the hand from above the table, through the beginning of the straight approach, into the table's field.
+    """A path of the hand that begins above the table, and then approaches straight, at a constant angle, into the table's field.
 
     The table's field is the zone around the table in which the hand's fields, larger volumes that are not solid, overlap the table.
-    `postures`: (w, n) rad.  `start`: index of the posture in which the straight approach begins.
+    `postures`: (w, n) rad, in the order of the path.  `start`: index of the posture at which the straight approach begins.
     """
 
     postures: Array
@@ -179,9 +179,9 @@ def _is_on_table(violations: Sequence[Violation], touching: tuple[str, ...]) -> 
 
 
 class Client:
-    """A client that sends position references along a path, one per tick, and starts again after a failure.
+    """A client that sends position references along a path, one per tick, and tries again (`retry`) when the reflex gives control back.
 
-    `begin`: index of the reference in which the straight approach begins.  `runs`: number of departures from there.
+    `begin`: index of the reference at which the straight approach begins.  `runs`: how often the client has begun the straight approach.
     """
 
     def __init__(self, robot: Robot, path: HandPath, dt: float) -> None:
@@ -218,6 +218,6 @@ class Client:
         return reference
 
     def retry(self, q: Array) -> None:
-        """Continue with the reference nearer to `q` (n,) rad: the first of the path, or that at the beginning of the straight approach."""
+        """Continue at the nearer of two references to `q` (n,) rad: the first of the path, or the first of the straight approach."""
         places = (0, self.begin)
         self._next = min(places, key=lambda place: float(np.abs(self._references[place] - q).max()))

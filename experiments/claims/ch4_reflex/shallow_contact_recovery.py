@@ -1,17 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Shallow contact recovery: the reflex when the hand enters the table's field at a low angle.
 
-Claim: the reflex of MoBeE 1.0 recovers from steep contacts.  The flatter the approach, the more often its recovery fails and control
-switches back and forth, since encoder noise decides what counts as contact.  A filter and a dead time prevent most of that.  MoBeE 2.0 lets
-the hand slide along the surface at any angle, and settles.  Source: thesis 4.4 (discussion), which gives no numbers.  Run time: 5 to 10
-minutes for 10 angles with 30 trials of each of four variants.
+Claim: the reflex of MoBeE 1.0, which moves the arm back along its recent poses, recovers from steep contacts.  The flatter the approach,
+the more often the recovery fails and control switches between client and reflex, because encoder noise decides what counts as contact.  A
+filter of the contacts and a dead time of the reflex prevent most of these failures.  MoBeE 2.0 lets the hand slide along the surface at any
+angle, and the arm settles.  Source: thesis 4.4 (discussion), which gives no numbers.  Run time: 5 to 10 minutes for 10 angles with 30
+trials of each of four variants.
 
-A client drives the left hand at 20 % speed along a straight path through the surface of the table's field, from 6 cm before it to 4 cm
-behind it.  For 12 s it tries again whenever it gets control back.  Motors have lag, delay, play and encoder noise; ticks of 10 ms.
-Variants: off = no reflex; naive = MoBeE 1.0 as chapter 4.1 describes it; mended = with filter and dead time; 2.0 = the client's references
-are attractors of the controller.  The first recovery of each trial counts.  It succeeds if the hand ends without contact, did not touch
-again or sink deeper while it moved back, and the reflex does not start again within 0.3 s.  It is clean if in addition the encoders
-reported no contact during the motion back.
+A client drives the left hand at 20 % speed along a straight path from 6 cm before the surface of the table's field (the zone around the
+table in which the fields of the hand, volumes that are not solid, overlap the table) to 4 cm behind it.  For 12 s it tries again whenever
+it gets control back.  The motors have lag, delay, play and encoder noise; a tick is 10 ms.  Variants: off = no reflex; naive = MoBeE 1.0 as
+chapter 4.1 describes it; mended = with filter and dead time; 2.0 = the client's references are attractors of the controller.  The first
+recovery of each trial counts.  It succeeds if the hand ends without contact, did not touch again or sink deeper while it moved back, and
+the next reflex does not start within 0.3 s.  It is clean if in addition the encoders reported no contact during the motion back.
 """
 
 from __future__ import annotations
@@ -80,9 +81,9 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Run all variants ("off", "naive", "mended", "2.0") at one spot and one angle, each several times with different encoder noise.
 
-    Returns a dict with the key "trials": a list of dicts with the fields of `Trial`.  It is empty if the hand has no path at this angle.
-    `settings`: "spot", number of the spot; "spots", how many are drawn; "angle" [deg]; "repeat", number of repetitions.  `seed`: of the
-    spots and the noise.
+    Returns a dict with the key "trials": a list of dicts with the fields of `Trial`.  The list is empty if the arm cannot follow a path at
+    this angle.  `settings`: "spot", index of the spot, a place at which the hand touches the table's field; "spots", how many spots are
+    drawn; "angle" [deg]; "repeat", number of repetitions.  `seed`: of the spots and the noise.
     """
     table, spot, angle = _table(), settings["spot"], settings["angle"]
     path = table.path(_spots(settings["spots"], seed)[spot], np.deg2rad(angle))
@@ -105,11 +106,11 @@ def _spots(count: int, seed: int) -> list[Spot]:
 class Truth:
     """Records the depths of contacts, and the first recovery (motion back along earlier poses), from the true joint positions.
 
-    `depth`, `solid`: depth [m] of the deepest contact, and of the deepest contact of solids.  `progress`: largest distance [m] from the
-    start along the table.  `flips`: number of changes between contact and no contact, by the encoders.  `flicker`: ticks from the first
-    contact to the last pose without contact, by the encoders.  Of the first recovery, `again`: contact returned, by the encoders;
-    `came_back`: the same by the true positions; `never`: the hand was still in contact at its end; `deeper`: the motion back was deeper
-    than the stop.
+    `depth`, `solid`: depth [m] of the deepest contact, and of the deepest contact of solids.  `progress`: largest distance [m] of the hand
+    from the start of the straight approach, along the table.  `flips`: number of changes between contact and no contact, by the encoders.
+    `flicker`: ticks from the first contact to the last pose without contact, by the encoders.  Of the first recovery, `again`: a contact
+    came back, by the encoders; `came_back`: the same by the true positions; `never`: the hand was still in contact at the end; `deeper`:
+    the hand was more than 1 mm deeper while it moved back than while it stopped.
     """
 
     def __init__(self, table: Table, path: HandPath) -> None:
@@ -129,8 +130,8 @@ class Truth:
     def update(self, q: Array, seen: bool, reflex: Reflex | None) -> None:
         """Record a tick.
 
-        `q`: true positions (n,) rad.  `seen`: whether the encoders reported a violation.  `reflex`: its state after the tick; None for
-        MoBeE 2.0.
+        `q`: true positions (n,) rad.  `seen`: whether the pose of the encoder values has a violation, such as a contact.  `reflex`: the
+        reflex after this tick; None for MoBeE 2.0.
         """
         pose = self._track.evaluate(q)
         depths = {"solid": 0.0, "field": 0.0}
@@ -177,15 +178,16 @@ class Trial:
     """Measurements of a trial.
 
     `variant`: "off" (no reflex), "naive" (reflex of MoBeE 1.0), "mended" (the same with filter and dead time) or "2.0" (controller of MoBeE
-    2.0).  `angle`: of approach, degrees.  `spot`: number of the place.  `seed`: of the encoder noise.  `depth`: depth of the deepest
-    contact, of fields or solids [m], by the true positions; `solid`: the same for solids.  `switches`: changes of control per second.
-    `flips`: changes between contact and no contact per second, by the encoders.  `flicker`: time [s] from the first contact to the last
-    pose without contact by the encoders; 0 unless the variant is "off".  `reflexes`: number of reflexes.
+    2.0).  `angle`: of approach, degrees.  `spot`: index of the place at which the hand touches.  `seed`: of the encoder noise.  `depth`:
+    depth of the deepest contact, of fields or solids [m], by the true positions; `solid`: the same for solids.  `switches`: changes of
+    control between client and reflex, per second.  `flips`: changes between contact and no contact per second, by the encoders.  `flicker`:
+    time [s] from the first contact to the last pose without contact by the encoders; 0 unless the variant is "off".  `reflexes`: number of
+    reflexes.
 
-    Of the first recovery, `again`: contact returned, by the encoders; `came_back`: the same by the true positions; `never`: the hand was
-    still in contact at the end of the recovery or of the trial; `deeper`: the motion back was deeper than the stop; `relapse`: the next
-    reflex started within 0.3 s.  `settled`: whether the arm settled, for variant "2.0".  `progress`: largest distance [m] from the start
-    along the table.
+    Of the first recovery, `again`: a contact came back, by the encoders; `came_back`: the same by the true positions; `never`: the hand was
+    still in contact at the end of the recovery or of the trial; `deeper`: the hand was more than 1 mm deeper while it moved back than while
+    it stopped; `relapse`: the next reflex started within 0.3 s.  `settled`: whether the arm settled, for variant "2.0".  `progress`:
+    largest distance [m] of the hand from the start of the straight approach, along the table.
     """
 
     variant: str
@@ -225,7 +227,8 @@ def run_trial(table: Table, path: HandPath, variant: str, angle: float, spot: in
     """Run a trial of 12 s and return its measurements.
 
     `variant`: "off" (no reflex), "naive" (reflex of MoBeE 1.0), "mended" (the same with filter and dead time) or "2.0" (controller of MoBeE
-    2.0).  `angle`: of the path, degrees; it is only stored.  `spot`: number of the place; with `seed` it determines the encoder noise.
+    2.0).  `angle`: of the path, degrees; it is only stored.  `spot`: index of the place at which the hand touches; with `seed` it
+    determines the encoder noise.
     """
     client = Client(table.robot, path, DT)
     body = _Body(table, client.start, np.random.default_rng([seed, spot, 0x677A]))
@@ -264,7 +267,7 @@ class Control:
 
     @property
     def switches(self) -> int:
-        """The number of changes of control."""
+        """The number of changes of control between client and reflex."""
         return len(self.taken) + len(self.given)
 
     @property
@@ -367,7 +370,7 @@ def summary(trials: Sequence[Trial]) -> dict[str, float]:
     """Return the means and extremes over the trials of one variant at one angle; without trials only their number, 0.
 
     Keys: "trials", number of trials; the names in SHARES, such as "recovered" and "switches", with the means of these attributes of
-    `Trial`; "depth_mm_median", "depth_mm_max" and "solid_mm_max", depths of contacts; "progress_cm", mean distance along the table.
+    `Trial`; "depth_mm_median", "depth_mm_max" and "solid_mm_max", depths of contacts; "progress_cm", mean of `progress` in cm.
     """
     if not trials:
         return {"trials": 0}

@@ -7,13 +7,14 @@ responses of both are synchronous, and the stochastic collection of training dat
 reproduction: with today's controllers no contact of solids between the robots deeper than 2 mm in an hour of robot time.
 
 Each robot gets random postures over its whole range at 20 % speed (23 motors of the iCub, 6 of the Katana), the same in all conditions.
-Protections: none; a reflex for each robot with its own history and waypoints, both equally fast or the Katana's a quarter as fast; one
-reflex with one history of both robots; a controller for each robot.  A reflex is triggered by contacts of its robot's fields and solids,
-its limits and clauses.  Motors have lag, delay, play and encoder noise; ticks of 10 ms; all in one process.  Contacts are those of the true
-posture, by the model; solids do not stop each other.  The controllers have the gains of their robots: the default ones, and those for
-derived fields.  Widths and gains were chosen with seeds 0 to 4 in view; the record has seeds from 100 on.  A collision is a contact of
-solids of both robots deeper than 2 mm.  Run time: three minutes on one core for an hour of robot time with controllers, and 20 minutes with
-each other protection.
+The protections are: none; a reflex for each robot, with its own history of poses, both equally fast ("in step") or the Katana's a quarter
+as fast ("out of step"); one reflex with one history for both robots; a controller of MoBeE 2.0 for each robot.  A reflex is triggered by a
+contact of its robot's fields or solids, a motor beyond a limit, or a violated clause (constraint on several joints).  Motors have lag,
+delay, play and encoder noise; a tick is 10 ms; everything runs in one process.  The model computes the contacts of the true postures;
+solids do not stop each other.  The iCub's controller has the default gains, the Katana's the gains for derived fields.  Widths of fields
+and gains were chosen with the results of seeds 0 to 4 in view; the recorded run has seeds from 100.  A collision is a contact deeper than 2
+mm between solids of the two robots.  Run time: for an hour of robot time on one core, three minutes with controllers, and 20 minutes with
+any other protection.
 """
 
 from __future__ import annotations
@@ -137,9 +138,9 @@ def findings(found: Cells) -> dict[str, Any]:
     """Return the results of the sweep as a dict with the keys "protections" and "claims".
 
     "protections": a dict from the protection to a dict with "minutes" of robot time; the number of "collisions" between the robots;
-    "deepest, mm", the depth of the deepest contact between them; "own, mm", that of a robot with itself or the table; the number of
-    "reflexes", and of those that got "stuck"; "rad a minute", the path of the motors.  "claims": a list with the judged claims, as dicts
-    (`Claim.record`).
+    "deepest, mm", the depth of the deepest contact of solids between them; "own, mm", the depth of the deepest one of a robot with itself
+    or the table; the number of "reflexes", and of those that got "stuck", because no recorded pose was without violation; "rad a minute",
+    the path of all motors per minute.  "claims": a list with the judged claims, as dicts (`Claim.record`).
     """
     groups = grouped(found, "condition", tuple(PROTECTIONS))
     rows = {

@@ -96,7 +96,7 @@ class Unprotected:
 class WithReflex:
     """A client and the reflex of MoBeE 1.0, which moves the robot back along its recent poses after a violation.
 
-    `watch`: returns the violations that trigger the reflex in a pose.
+    `client`: sends the references.  `watch`: function that returns the violations in a pose; they trigger the reflex.
     """
 
     mode: Mode = "position"
@@ -147,7 +147,7 @@ class WithController:
     def command(self, k: int, q: Array, pose: Pose) -> Array:
         """Return the velocities (n_own,) rad/s that the controller commands in tick `k`; see `Protected.command`.
 
-        When the motion has settled or timed out, the next posture becomes the attractor.
+        When the motion has settled or timed out, the client's next random posture becomes the attractor.
         """
         controller, own = self._controller, self._own
         velocity = controller.step(q, DT, pose=pose).velocity[own]
@@ -165,9 +165,10 @@ class WithController:
 class Truth:
     """Records the contacts of the true postures of two robots.
 
-    `collisions`: number of contacts of solids between the robots that became deeper than DEEP (2 mm).  `deepest`: depth of the deepest one
-    [m].  `deepest_own`: the same for a robot with itself or the table [m].  `path`: length of the paths of all motors, summed [rad].
-    `near`: number of contacts between the robots in which at least one volume is a field (not solid), summed over all ticks.
+    `collisions`: number of contacts of solids between the robots that became deeper than DEEP (2 mm).  `deepest`: depth of the deepest
+    contact of solids between the robots [m].  `deepest_own`: the same for a robot with itself or the table [m].  `path`: length of the
+    paths of all motors, summed [rad].  `near`: number of contacts between the robots in which at least one volume is a field (not solid),
+    summed over all ticks.
     """
 
     collisions: int = 0
@@ -201,7 +202,7 @@ class Truth:
 
 
 def is_between(first: str, second: str) -> bool:
-    """Whether a contact of shapes `first` and `second` (names) is one between the two robots.  Objects of the world belong to no robot."""
+    """Whether a contact is one between the two robots.  `first`, `second`: names of its shapes; `second` may also be a world object."""
     shapes = {shape.name for shape in two_robots().shapes}
     return second in shapes and first.startswith(MARK) != second.startswith(MARK)
 
@@ -231,8 +232,9 @@ def _is_of(robot: str, violation: Violation) -> bool:
 def babble(makers: Sequence[tuple[slice, Protected]], model: Model, minutes: float, seed: int) -> Truth:
     """Simulate both robots for `minutes` of robot time, and return the record of their contacts.
 
-    `makers`: pairs of a slice of the motors of both robots, and the protected client that commands these motors.  `seed`: of the motors'
-    encoder noise.  A command that is computed from the encoders of tick k moves the motors from tick k + 1 on, as in the live system.
+    `makers`: pairs of a slice, among the motors of both robots, and the protected client that commands the motors of this slice.  `seed`:
+    of the motors' encoder noise.  A command that is computed from the encoders of tick k moves the motors from tick k + 1 on, as in the
+    live system.
     """
     robot, parameters, truth = two_robots(), MotorParameters(), Truth()
     motors = Motors(robot, parameters, seed, robot.home)

@@ -5,19 +5,20 @@ Claim: adaptive roadmap planning "works well in practice, generating reaches to 
 Published: pictures of a cup, no numbers, and no grasp.  Our goals: at least 90 % of the placements end in a pre-grasp within 2 cm and 15
 degrees with nothing knocked over, and at least 75 % lift and place.
 
-A seed draws the place of the cup (5.6 cm wide, 13 cm high, 150 g) and 0 to 3 pieces of clutter; the first piece is not seen by the cameras.
-Placements without room for the open hand beside the cup are drawn again.  Cup and clutter move when they are pushed.  Seen places have
-errors of 2 mm along each axis.  Everything runs in one process: the model, the controller with the default gains, and MuJoCo in ticks of 10
-ms.  The motors have lag, delay, play and encoder noise; the finger motors have 0.3 and 0.09 N m.  The fields of the cup and of the seen
-clutter do not push the hand, as in a reach.  A jump of the torques of shoulder and waist is a bump: the arm moves back, and the next plan
-leads around or over that place of the palm.
+A seed draws the place of the cup (5.6 cm wide, 13 cm high, 150 g) and 0 to 3 pieces of clutter; the cameras do not see the first piece.
+Placements without room for the open hand beside the cup are drawn again.  Cup and clutter move when they are pushed.  The places that the
+cameras report have random errors, with a standard deviation of 2 mm along x and y.  Everything runs in one process: the model, the
+controller with the default gains, and MuJoCo in ticks of 10 ms.  The motors have lag, delay, play and encoder noise; the largest torques of
+the finger motors are 0.09 and 0.3 N m.  As in a reach, contacts of the fields with the cup and with the seen clutter exert no force on the
+hand.  A jump of the torques of shoulder and waist is a bump: the arm moves back, and the next plan leads around or over the position of the
+palm at the bump.
 
-Planners of the path to the pre-grasp: the map of pre-grasps (A* over free edges); the learned reacher, which has learned 300 problem-tries
-on the offline plant without clutter, and moves the arm alone; inverse kinematics with RRT-Connect of OMPL.  Grasp, lift and placing are the
-same for all.
+Planners of the path to the pre-grasp: the map of pre-grasps (A* over free edges); the learned reacher, which has learned from 300 tries (a
+plan and then a reach to a target) on the offline plant without clutter, and moves only the arm; inverse kinematics with RRT-Connect of
+OMPL.  Grasp, lift and placing are the same for all.
 
-The numbers of grip, bump and motions were chosen with seeds below 520 in view; results are of seeds from 520 on.  Run time: 5 s of
-processor time for a trial.  Needs the extras `sim` and `planning`.
+The settings of grip, bumps and motions were chosen with the results of seeds below 520 in view; the results are those of seeds from 520.
+Run time: 5 s of processor time for a trial.  Needs the extras `sim` and `planning`.
 """
 
 from __future__ import annotations
@@ -84,9 +85,10 @@ def _reasons(runs: Runs) -> dict[str, int]:
 def findings(found: Cells) -> dict[str, Any]:
     """Return the results of the sweep.
 
-    Keys: "planners", a dict from the planner to its numbers; "ended", a dict from the planner to a dict from the reason for which trials
-    ended early to their number; "claims", a list with the judged claims, as dicts (`Claim.record`).  Among the numbers, "planning, ms" is
-    the processor time of all plans of a trial, median; "distance, mm" and "angle, deg" are None if no trial came to the pre-grasp.
+    Keys: "planners", a dict from the planner to a dict of its measures; "ended", a dict from the planner to a dict from a reason, for which
+    trials failed, to the number of these trials; "claims", a list with the judged claims, as dicts (`Claim.record`).  Among the measures,
+    "planning, ms" is the processor time of all plans of a trial, median; "distance, mm" and "angle, deg" are None if no trial came to the
+    pre-grasp.
     """
     rows: dict[str, Any] = {}
     reasons: dict[str, Any] = {}

@@ -4,13 +4,13 @@
 Claim: a robot calibrates its cameras by looking at its own hand, and knows how well.  Source: thesis 4.1.2 lets two robots look at each
 other's world, without numbers for calibrated stereo.  Aims of this reproduction: after `mobee calibrate` the position of a ball is wrong by
 at most 5 mm (median) and 15 mm (95 %), over 500 random gazes and places (100 for each of 5 robots), with cameras displaced by up to 2 cm
-and 2 deg and head encoders that are wrong by up to 1 deg; and the reported covariance is honest: the normalised error is within its 95 %
-band for 90 to 98 % of the places.
+and 2 deg and head encoders that are wrong by up to 1 deg; and the reported covariance is honest: the squared error, normalised by this
+covariance, is below the 95 % quantile of its distribution for 90 to 98 % of the places.
 
 A trial draws the errors of one robot, calibrates it by 40 postures of its hand, and then shows it balls.  All pictures are rendered with
-distortion, noise and motion blur, in a cluttered room.  "Before" is the same sightings with the model's own cameras.  Only sightings for
-which both positions can be computed count: before the calibration, the point nearest to both rays; after it, the position by the outlines
-(`mobee.vision.objects`).  Run time: one minute a robot on one core.
+distortion, noise and motion blur, in a cluttered room.  "Before" the calibration, a position is the point nearest to the two rays of the
+ball, by the cameras of the model; "after" it, the position is computed from the outlines in the same pictures (`mobee.vision.objects`).
+Only pictures from which both positions can be computed count.  Run time: one minute a robot on one core.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 @cache
 def rig() -> Rig:
-    """Return the iCub with its cameras and a tag on its left palm."""
+    """Return the iCub with its cameras and a tag (a printed marker) on its left palm."""
     robot = load_robot("icub")
     return Rig(robot, cameras_of(robot), CameraSettings().lens, Tag("left_palm"))
 

@@ -3,15 +3,15 @@
 
 Claim: a robot that has calibrated its cameras by looking at its own hand places ball, cup and box within millimetres, knows how well, and
 sees nothing where nothing is.  Source: thesis 4.3.3 puts into the world what the eyes see, without numbers.  Aims of this reproduction:
-over random gazes and places the error is at most 5 mm (median) and 15 mm (95 %); the normalised error is within its 95 % band for 90 to 98
-% of the places; and no false object is reported in 10 minutes, at 15 pictures a second, before an empty table with paper of the colours of
-the things.
+over random gazes and places the error is at most 5 mm (median) and 15 mm (95 %); the squared error, normalised by the reported covariance,
+is below the 95 % quantile of its distribution for 90 to 98 % of the places; and no false object is reported in 10 minutes, at 15 pictures a
+second, before a table without the things, where papers have the colours of the things.
 
 A trial draws the errors of one robot and calibrates it by 40 postures of its hand.  Then it shows ball, cup and box side by side in random
-places, each thing upright and with a random angle, and looks once: what is hidden by another thing or an arm may be missed.  All pictures
-are rendered with distortion, noise and motion blur, in a cluttered room.  For the last claim the things are taken away, and the head looks
-around: 15 pictures with each of many random gazes, followed by the tracker as in the live system.  Run time: five minutes a robot on one
-core.
+places, each thing upright and with a random angle, and takes one picture with each camera; things that are hidden by another thing or an
+arm may be missed.  All pictures are rendered with distortion, noise and motion blur, in a cluttered room.  For the last claim the things
+are taken away, and the head looks around: 15 pairs of pictures with each of many random gazes, from which the tracker reports objects as in
+the live system.  Run time: five minutes a robot on one core.
 """
 
 from __future__ import annotations
@@ -95,8 +95,8 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 class Robot:
     """A calibrated robot at its table, whose cameras look at things.
 
-    `things`: what it can recognise.  `pictures`: number of pictures so far.  `regions`: number of detected regions in them.  `seconds`:
-    processor time of the detector [s].
+    `things`: the objects that it can recognise.  `pictures`: number of pictures so far.  `regions`: number of detected regions in these
+    pictures.  `seconds`: processor time of the detector [s].
 
     Args:
         world: name of the world with the things.
@@ -170,11 +170,12 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Calibrate one robot, show it ball, cup and box, and then an empty table.
 
     For each thing that was seen N times: "NAME_error" (N,) m, distance from its true position; "NAME_normalised" (N,), squared error,
-    normalised by the covariance that the robot computes; "NAME_size" (N, g), relative errors of its g sizes.  "box_angle" (N,) rad: error
-    of the box's angle.  Numbers: "shown", gazes at things; "taken_for_another", places more than 5 cm wrong; "looks", pairs of pictures of
-    the empty table; "false_objects" and "false_places", what the tracker and single looks reported there; "false_regions", detected regions
-    per picture there; "detector_ms", processor time per picture.  `settings`: "world", its name; "postures" of the calibration, "gazes" at
-    things, "looks" at the empty table, their numbers; "detector", its name (optional).  `seed`: of everything random.
+    normalised by the covariance that the robot computes; "NAME_size" (N, g), relative errors of its g sizes, as radius or edges.
+    "box_angle" (N,) rad: error of the box's angle.  Counts: "shown", gazes at things; "taken_for_another", reported positions more than 5
+    cm from the true one; "looks", pairs of pictures of the empty table; "false_objects", objects that the tracker reported there, and
+    "false_places", objects in single pairs of pictures.  "false_regions": regions per picture detected there.  "detector_ms": processor
+    time per picture [ms].  `settings`: "world", its name; numbers of "postures" of the calibration, of "gazes" at things, and of "looks" at
+    the empty table; "detector", its name (optional).  `seed`: of everything random.
     """
     robot = Robot(settings["world"], settings["postures"], seed, settings.get("detector", COLOR))
     return {**_with_things(robot, settings["gazes"]), **_without(robot, settings["looks"])}

@@ -9,10 +9,10 @@ better than stereo by the uncalibrated cameras.
 A trial draws the errors of one iCub's cameras and head encoders, as in hand-eye-calibration.  The Katana carries a red ball (the thesis: a
 children's block) to random places 20 to 65 cm from the eyes; for each, the iCub looks from random postures of torso, head and eyes.  Both
 move on the offline plant under one model, kept apart by the controller; pictures are rendered with distortion and noise, in a room without
-clutter on the table.  The Katana reports the place by its own encoders.  A fifth of the Katana's poses is held out: no localiser learns
-from any picture of them.  The localisers are compared with stereo by the model's own cameras, and with stereo by cameras that were
-calibrated by 20 postures of the hand.  Errors are distances from the ball's true place; the error of a robot is its median.  Run time:
-about three minutes a robot on one core.
+clutter on the table.  The Katana reports the place by its own encoders.  A fifth of the Katana's poses is held out: no localiser (method
+that computes the ball's position from both pictures and the encoders) learns from a picture of them.  The localisers are compared with
+stereo by the model's own cameras, and with stereo by cameras that were calibrated by 20 postures of the hand.  Errors are distances from
+the ball's true place; the error of a robot is its median.  Run time: about three minutes a robot on one core.
 """
 
 from __future__ import annotations
@@ -77,9 +77,10 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Let the Katana teach one iCub where things are, and measure stereo and all localisers on poses of the Katana that were held out.
 
     Main keys: "errors, NAME", distances (N,) m of the computed from the true positions, for stereo and each localiser; "curves", dict from
-    a localiser to its median errors [m], one for each number of lessons in "counts"; "held_out", number of lessons for the test;
-    "reported", median error [m] of the positions that the Katana reports; "robot_seconds", robot time of the teaching [s].  `settings`:
-    "poses" of the Katana, "looks" at each, and "postures" of the calibration for stereo, their numbers.  `seed`: of everything random.
+    a localiser to its median errors [m], one for each number of lessons (labelled samples) in "counts"; "held_out", number of lessons for
+    the test; "reported", median error [m] of the positions that the Katana reports; "robot_seconds", robot time of the teaching [s].
+    `settings`: "poses" of the Katana, "looks" at each, and "postures" of the calibration for stereo, their numbers.  `seed`: of everything
+    random.
     """
     lessons, time = taught(settings["poses"], settings["looks"], seed)
     learned, held_out = split_by_pose(lessons.poses, HELD_OUT, seed)
@@ -209,9 +210,9 @@ CLAIMS = (corrected, model_free, network, programs)
 def findings(found: Cells) -> dict[str, Any]:
     """Return the results of the sweep.
 
-    Keys: "localisers", a dict from a localiser to the median and 95 % quantile of its errors [cm], as text; it has stereo without and with
-    calibration, too; "robots", a dict from each finished cell (one simulated robot) to the numbers of its lessons, poses and time;
-    "claims", a list with the judged claims, as dicts (`Claim.record`).
+    Keys: "localisers", a dict from a localiser, or from stereo without or with calibration, to the median and 95 % quantile of its errors
+    [cm], as text; "robots", a dict from each finished cell (one simulated robot) to the numbers of its lessons, poses and time; "claims", a
+    list with the judged claims, as dicts (`Claim.record`).
     """
     groups = grouped(found, "teacher", ("katana",))
     runs = groups.get("katana", [])

@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Constraint violations: a search for the command that violates the cable rows or the forearm clauses most.
 
-Claim: with the default gains no attractors, inside or far outside the joint box, held or in any sequence, carry an arm more than 2 degrees
-beyond a constraint (-s/|a|, along the normal).  The fastest impact of a motor at a hard stop is reported too.  Source: this project's goal;
-the constraints are those of thesis 5.2.5.  Published: no number; the thesis says of positional constraints that their forces may grow
-without bound, "but this never happens in practice".  Run time: 10 000 tries for both gain sets and 2000 with forces of a client, a few
-minutes.
+Claim: with the default gains no attractors, inside or far outside the motors' ranges, held or in any sequence, carry an arm more than 2
+degrees beyond a constraint on several joints (at least one of its inequalities a.q + b > 0 must hold), measured along the normal, -(a.q +
+b)/|a|.  The fastest impact of a motor at a hard stop is reported too.  Source: this project's goal; the constraints are those of thesis
+5.2.5.  Published: no number; the thesis says of positional constraints that their forces may grow without bound, "but this never happens in
+practice".  Run time: 10 000 tries for both gain sets and 2000 with forces of a client, a few minutes.
 
-A try is one arm's command: a start, three attractors, and how long each is in force.  In the part called "forced" it has in addition, for
-each attractor, a force in configuration space and one at the palm.  Both arms try at once while the torso moves to a random posture, with a
-table in front; the motors are those of the published findings.  The first part of the tries is random; the others vary and cross the worst
-commands so far for every clause.  The forced tries are not part of the claim: there the client pushes with the largest force.
+A try is one command of one arm: a start, three attractors, and how long each attractor is in force.  A forced try has in addition, for each
+attractor, a force in configuration space and one at the palm.  Both arms try at once while the torso moves to a random posture, with a
+table in front of the robot; the motors are those with which the published findings are reproduced.  The first 30 % of the tries are random;
+each of the others varies and combines commands from the worst so far for a clause (constraint).  The forced tries are not part of the
+claim: there a client pushes with the largest force.
 """
 
 from __future__ import annotations
@@ -66,13 +67,14 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 class Search:
     """The state of a search for the largest violation of a constraint, a clause on several joints of an arm.
 
-    Violations are degrees along the normal of the constraint, the largest so far, negative inside.  A generation is a group of up to 100
-    tries that are drawn in the same manner.  `gains`: name of the gain set.  `forced`: whether a client pushes.  `seed`: of the tries.
-    `tries`: number so far.  `worst`: violation of all tries.  `by_clause`: violation of each clause.  `stop`: fastest impact of a joint at
-    a hard stop [deg/s].  `course`: pairs of the number of tries and the largest violation so far.  `inside`: violation in each generation
-    by tries with attractors inside the joint box.  `random`: violation in each generation of random tries.  `elite`: for each clause, pairs
-    of a violation and the command that caused it, for the worst commands.  `worst_try`: commands, torso posture, seed, arm and clause of
-    the worst try, to repeat it.
+    A violation is the distance beyond the constraint in degrees, along its normal, negative inside; the attributes have the largest
+    violations so far.  A generation is a group of up to 100 tries that are drawn in the same manner.  `gains`: name of the gain set.
+    `forced`: whether a client pushes.  `seed`: of the tries.  `tries`: number so far.  `worst`: largest violation.  `by_clause`: largest
+    violation of each clause of an arm.  `stop`: fastest impact of a joint at a hard stop [deg/s].  `course`: pairs of the number of tries
+    and the largest violation so far.  `inside`: for each generation, the largest violation of its tries with all attractors within the
+    motors' ranges.  `random`: for each generation of random tries, its largest violation.  `elite`: for each clause, pairs of a violation
+    and the command that caused it, for the worst commands.  `worst_try`: commands, torso posture, seed, arm and clause of the worst try, to
+    repeat it.
     """
 
     gains: str
@@ -101,7 +103,7 @@ def search(gains: str, forced: bool, tries: int, seed: int) -> Search:
     """Search for large violations: first by random tries, then by variations of the worst commands of each clause.
 
     `gains`: name of the gain set.  `forced`: whether a client pushes.  `tries`: number of tries to make; both arms try at once, so if it is
-    odd, the last run counts for the left arm only.  Returns the final state.  `seed`: of the random commands.
+    odd, only the left arm's try of the last run counts.  Returns the final state.  `seed`: of the random commands.
     """
     state, numbers = Search(gains, forced, seed), Gains.named(gains)
     while state.tries < tries:
@@ -155,9 +157,9 @@ def _record(state: Search, tried: Tried, commands: list[Command], torso: list[fl
 def findings(found: Cells) -> dict[str, Any]:
     """Return the results as a dict from the gain set to a dict with "attractors" (no forces of a client) and "forced", and "passed".
 
-    Each of the two is a dict with the largest violations of a search, in degrees along the normal of a constraint, negative inside; of
-    several seeds the worst one.  "allowed_deg" is the bound, 2 degrees.  "passed": whether the largest violation of the default gains
-    without forces is below it; None if they were not run.
+    "attractors" and "forced" are dicts with the largest violations of a search, in degrees along the normal of a constraint, negative
+    inside; of the searches with several seeds the worst is taken.  "allowed_deg": the bound, 2 degrees.  "passed": whether the largest
+    violation with the default gains and without forces is below the bound; None if this search was not run.
     """
     table: dict[str, Any] = {}
     for state in sorted(_searches(found), key=lambda state: state.worst):
@@ -186,7 +188,7 @@ def _searches(found: Cells) -> list[Search]:
 
 
 def plot(found: Cells) -> Any:
-    """Return a figure with three panels: largest violation over tries, by clause, and the worst tries over time."""
+    """Return a figure with three panels: the largest violation over the tries and by clause, and the worst tries over time."""
     states = _searches(found)
     drawing = new_figure(14.0, 4.6)
     course, clauses, over_time = drawing.subplots(1, 3, width_ratios=(1.0, 1.35, 1.0))

@@ -7,8 +7,9 @@ oscillate by more than 1 mm at rest.  Source: thesis 5.2.2-5.2.4 (f_config and f
 forces") and 5.1 (J^T control of an unreachable target "will cause the robot to oscillate").  Published: no numbers.  Run time: about six
 minutes.
 
-The force rises in steps of three seconds each, for both gain sets.  The hand is pulled by the whole body (`mobee.Reacher`).  Depths are
-measured at the true joint positions.
+The experiment has two parts, for both gain sets.  Walls: a force that rises in levels of three seconds presses the robot into table, body
+or limits.  Targets: `mobee.Reacher` pulls the hand to targets with all motors of the body.  Depths are measured at the true joint
+positions.
 """
 
 from __future__ import annotations
@@ -93,7 +94,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
     """Return the conditions of the sweep: every wall and every target with each gain set.
 
-    With --quick: the first three of each, with three levels of force.
+    A wall is a kind of push into table, body or limits.  With --quick: the first three walls and targets, with three levels of force.
     """
     levels, cases = (QUICK_LEVELS, QUICK_CASES) if arguments.quick else (LEVELS, None)
     found = []
@@ -121,13 +122,13 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 def press(gains: str, wall: str, levels: Sequence[float], seed: int) -> list[Record]:
     """Push the robot from home with one level of force after the other, and return a record for each level.
 
-    `gains`: name of the gain set.  `wall`: a key of PUSHES.  `seed`: of the plant.  `levels`: forces before the squash, in N/kg at a marker
-    or rad/s^2 at a motor.
+    `gains`: name of the gain set.  `wall`: a key of PUSHES, the markers or motors that are pushed and the direction.  `seed`: of the plant.
+    `levels`: forces before they are bounded by the control law (squash, eq. 5.8), in N/kg at a marker or rad/s^2 at a motor.
 
-    Each record has the worst values during the level: "solid_mm" and "beside_mm", depths of contacts of solids, of the pairs of shapes that
-    the simulator tests too, and of all others; "pair", the deepest of the tested pairs; "field_mm", depth of contacts of fields, volumes
-    that are not solid; "clause_deg" and "limit_deg", distances beyond constraints and limits, negative inside; "restless_mm", oscillation
-    of the palms.
+    Each record has the worst values during the level: "solid_mm" and "beside_mm", depth of contacts of solids, for the pairs of shapes that
+    the simulator tests too, and for all other pairs; "pair", the deepest of the tested pairs; "field_mm", depth of contacts of fields,
+    volumes that are not solid; "clause_deg" and "limit_deg", distances beyond constraints and limits, negative inside; "restless_mm",
+    oscillation of the palms.
     """
     plant = OfflinePlant(icub_at_table(), seed, Gains.named(gains), dt=PERIOD[gains])
     robot, step = plant.robot, max(1, round(SAMPLING / plant.dt))
@@ -163,9 +164,9 @@ def draw_hand(gains: str, name: str, seed: int) -> tuple[Record, Array, Array]:
     `gains`: name of the gain set, "default" or "published_2014".  `name`: a key of GOALS, which gives the start posture and the targets.
     `seed`: of the plant.
 
-    Returns the measurements, times (T,) s, and distances (T,) m of the hand from the target of each time.  The measurements are
-    "oscillation_mm" and "from_target_mm", oscillation and distance from the last target at the end; "dead_s", the longest time for which
-    the hand stood still before it was at its end position; and the names "gains" and "target".
+    Returns the measurements, times (T,) s, and the distances (T,) m of the hand from the target that is in force at these times.  The
+    measurements are "oscillation_mm" and "from_target_mm", oscillation and distance from the last target at the end; "dead_s", the longest
+    time for which the hand stood still before it was at its end position; and the names "gains" and "target".
     """
     goal, robot = GOALS[name], icub().robot
     plant = OfflinePlant(icub(), seed, Gains.named(gains), dt=PERIOD[gains])
@@ -213,7 +214,8 @@ def findings(found: Cells) -> dict[str, Any]:
     """Return the largest measurements as a dict from the gain set to a dict from the wall, or "drawn: " and the target, to numbers by name.
 
     The names are keys of the dicts of `press` and `draw_hand`.  "passed": whether with the default gains solids are at most 2 mm deep,
-    constraints violated by at most 2 degrees, oscillations at most 1 mm, and times without motion at most 0.3 s; None if they were not run.
+    constraints violated by at most 2 degrees, oscillations at most 1 mm, and times without motion at most 0.3 s; None if the default gains
+    were not run.
     """
     pressed, drawn = _grouped(found)
     table: dict[str, Any] = {gains: {} for gains in GAINS}

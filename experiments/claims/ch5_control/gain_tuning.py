@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Gain tuning: the search that tuned `Gains.default()`, a (1+1) evolution strategy over the logarithms of the gains.
 
-Claim: no gains that a seeded search finds are clearly better than `Gains.default()` by the criteria of `Judged`: settling
-time, overshoot, solids that touch while the hands press 5 to 25 cm into the table, while a client pushes and while the robot
-wanders between random postures, chatter at the table with commands one, three and four ticks old at 100 Hz, violated constraints.
-Source: this project's goals for MoBeE 2.0 (thesis 5.2).  Published number: none, the thesis has no criteria.  Run time: half an
-hour for 100 gain sets.
+Claim: no gains that a seeded search finds are clearly better than `Gains.default()` by the criteria of `Judged`: settling time and
+overshoot; depths of solid contacts while the hands are commanded 5 to 25 cm below the table's top, while a client pushes, and while the
+robot moves between random postures; chatter of the hands at the table with commands that are one, three and four ticks old, at 100 Hz; and
+violated constraints.  Source: this project's goals for MoBeE 2.0 (thesis 5.2).  Published number: none, the thesis has no criteria.  Run
+time: half an hour for 100 gain sets.
 
-The first set judged is `Gains.default()` itself.  Each of the others changes a few numbers of the best so far by random factors, which
-grow after a success and shrink after a failure.  The result is a table of the default and the best set.
+The first gain set that is judged is `Gains.default()` itself.  Each later set changes one to three values of the best set so far by random
+factors; the spread of these factors grows after a success and shrinks after a failure.  The result is a table of the default and the best
+set.
 """
 
 from __future__ import annotations
@@ -61,12 +62,12 @@ PALMS = ("left_palm", "right_palm")
 class Judged(Row):
     """The criteria by which a gain set is judged, measured at the true joint positions.
 
-    `settling_s`: median settling time of steps [s].  `overshoot`: the largest of a motor's step, as a share of the step.  `solid_mm`:
-    deepest solid contact while the robot wanders and while the hands press into the table with commands 1 and 3 ticks old; `field_mm`:
-    deepest field contact while pressing; `pushed_mm`: deepest solid contact while a client pushes.  `chatter_mm`, `late_mm`, `later_mm`:
-    chatter of the palms with commands 1, 3 and 4 ticks old.  `clause_deg`, `forced_deg`: largest violation of a constraint without and with
-    a pushing client, negative inside.  `stop_deg_s`: fastest impact at a hard stop.  `longest_ms`: longest control period at which the
-    control law is stable.
+    `settling_s`: median settling time of steps [s].  `overshoot`: largest overshoot of a step of a single motor, as a share of the step.
+    `solid_mm`: depth of the deepest solid contact while the robot moves between random postures, and while the hands press into the table
+    with commands 1 and 3 ticks old; `field_mm`: depth of the deepest field contact while they press; `pushed_mm`: depth of the deepest
+    solid contact while a client pushes.  `chatter_mm`, `late_mm`, `later_mm`: oscillation of the palms at the table with commands 1, 3 and
+    4 ticks old, mean over the postures.  `clause_deg`, `forced_deg`: largest violation of a constraint without and with a pushing client,
+    negative inside.  `stop_deg_s`: fastest impact at a hard stop.  `longest_ms`: longest control period at which the control law is stable.
     """
 
     settling_s: float  # median of steps of motors and postures
@@ -100,7 +101,7 @@ MIN_LONGEST = 25.0  # ms; a period of 20 must be possible
 
 
 def objective(judged: Judged) -> float:
-    """Return the objective of the search: the settling time [s] plus prices of unmet requirements.  Smaller is better."""
+    """Return the objective of the search: the settling time [s] plus a penalty for each unmet requirement (WANTED).  Smaller is better."""
     cost = judged.settling_s + 0.2 * max(0.0, MIN_LONGEST - judged.longest_ms)
     for name, (wanted, price) in WANTED.items():
         cost += price * max(0.0, getattr(judged, name) - wanted)
@@ -133,7 +134,7 @@ def evaluate(gains: Gains) -> Judged:
 
 @dataclass(frozen=True, slots=True)
 class Pressed:
-    """Depths of the deepest solid and field contact, and the chatter of the palms, of one press into the table [m]."""
+    """Depths of the deepest solid and field contact, and the chatter (oscillation) of the palms, while hands press into the table [m]."""
 
     solid: float
     field: float
@@ -141,7 +142,7 @@ class Pressed:
 
 
 def press_targets(count: int) -> list[Array]:
-    """Draw `count` postures (n,) rad in which a palm is 5 to 25 cm below the table's top, and which have no contacts without a table."""
+    """Draw `count` postures (n,) rad in which a palm is 5 to 25 cm below the table's top, and which have no contacts if there is no table."""
     robot = icub_at_table().robot
     rng, free = np.random.default_rng(PRESS_SEED), icub()
     found: list[Array] = []
@@ -156,9 +157,9 @@ def press_targets(count: int) -> list[Array]:
 
 
 def press(gains: Gains, target: Array, age: int, dt: float = 0.01) -> Pressed:
-    """Command all parts to a posture below the table's top, with commands that are `age` ticks old.
+    """Command all parts to a posture below the table's top, with commands that take effect `age` ticks after they were computed.
 
-    `target`: the posture (n,) rad.  `dt`: tick [s].  Returns depths and chatter.
+    `target`: the posture (n,) rad.  `dt`: duration of a tick [s].  Returns depths and chatter.
     """
     late = MotorParameters(delay=float(MotorParameters().of_motors("delay", 1)[0]) + (age - 1) * dt)
     plant = OfflinePlant(icub_at_table(), PRESS_SEED, gains, late, dt)
@@ -275,7 +276,7 @@ class Tried:
 
     @property
     def objective(self) -> float:
-        """The settling time [s] plus prices of unmet requirements, which the search minimises, as in the function `objective`."""
+        """The settling time [s] plus penalties for unmet requirements, which the search minimises, as in the function `objective`."""
         return objective(self.judged)
 
     def record(self) -> dict[str, object]:

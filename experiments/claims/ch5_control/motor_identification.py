@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Motor identification: lag, delay, backlash and friction of the PyBullet robot's motors, fitted to responses to velocities.
 
-Claim: the motor model of `mobee.simulation` with numbers fitted to the encoder readings of the PyBullet robot describes that robot,
-gravity and inertia included: the residual of a response is its noise.  Source: thesis 2.2 (the robot does not follow its
-commands exactly).  Nothing is published to compare with; the fit is compared with the numbers that the published findings need.
-Run time: five minutes on a quiet machine, nearly all of it PyBullet's.
+Claim: the motor model of `mobee.simulation`, with parameters that are fitted to the encoder readings of the PyBullet robot, describes that
+robot, gravity and inertia included: the residuals of the responses are only encoder noise.  Source: thesis 2.2 (the robot does not follow
+its commands exactly).  No parameters are published; the fit is compared with the published setting, the parameters with which the published
+findings are reproduced.  Run time: five minutes on a quiet machine, nearly all of it PyBullet's.
 
-The robot is a black box: velocities go in, encoder positions with their noise come out.  The method is checked first, on
-simulated motors with known parameters; held-out signals check the fit; finally an arm makes the same actions with PyBullet and with
-the offline plant.  The raw responses are kept in `responses/`, one file per motor; an interrupted run continues after them.
-`identified.toml` is the file shipped in `mobee/simulation/identified/`.
+The robot is a black box: velocities are its inputs, noisy encoder positions its outputs.  First the method is checked on simulated motors
+with known parameters.  Signals that are not used in the fit check the result.  At the end an arm makes the same actions with PyBullet and
+with the offline plant.  The raw responses are in `responses/`, one file per motor; --resume continues an interrupted run after the last of
+them.  The run writes `identified.toml`, which is shipped in `mobee/simulation/identified/`.
 """
 
 from __future__ import annotations
@@ -84,11 +84,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Identify the motors of the PyBullet robot from their responses, and compare it with the offline plant; steps that are done are kept.
+    """Identify the motors of the PyBullet robot from their responses, and compare its motions with those of the offline plant.
 
-    First the fit is checked on simulated motors with known parameters.  Then the responses are recorded in `folder`, the motor model is
-    fitted to them, and tables of the fitted values are written.  Returns "passed" and "method", the result of the check; "parameters",
-    "encoder_noise" and "residual", statistics of the fit as in `summary`; and "reproduced", the differences of motions as in `reproduce`.
+    The check and the responses that `folder` already has are not made again.  First the fit is checked on simulated motors with known
+    parameters.  Then the responses are recorded in `folder`, the motor model is fitted to them, and tables of the fitted values are
+    written.  Returns "passed" and "method", the result of the check; "parameters", "encoder_noise" and "residual", statistics of the fit as
+    in `summary`; and "reproduced", the differences of motions as in `reproduce`.
     """
     robot = load_robot("icub")
     method = _check(arguments, robot, folder / METHOD)
@@ -129,7 +130,7 @@ def _record(arguments: argparse.Namespace, robot: Robot, folder: Path) -> list[P
 class BodyPlant:
     """A control loop like that of `OfflinePlant`, but with another simulated body, such as PyBullet's.
 
-    As in the live system, a command that is computed in a tick moves the body in the next tick.  `controller`: its controller.
+    As in the live system, a command that is computed in a tick moves the body in the next tick.  `controller`: the controller of the loop.
     """
 
     def __init__(self, model: Model, body: Backend) -> None:
@@ -151,9 +152,9 @@ class BodyPlant:
 def reproduce(robot: Robot, fit: Fit, actions: int, seed: int) -> dict[str, Any]:
     """Run the same actions of an arm with PyBullet and with the offline plant, and compare the motions with PyBullet's.
 
-    Returns the differences of the motors' positions [deg] ("rms_deg", "largest_deg", and at the ends of actions "end_deg" and
-    "largest_end_deg") for the offline plant with "identified", "published" and "ideal" motors, and for "pybullet_with_other_noise".  `fit`:
-    the fitted motors.  `actions`: their number.  `seed`: of actions and noise.
+    Returns a dict from "identified", "published" and "ideal", the motors of the offline plant, and from "pybullet_with_other_noise", to a
+    dict with the differences from PyBullet's encoder values [deg]: "rms_deg" and "largest_deg", and, at the ends of actions, the mean
+    "end_deg" and "largest_end_deg".  `fit`: the fitted motors.  `actions`: their number.  `seed`: of actions and noise.
     """
     model = Model(robot, World())
     targets = free_targets(model, actions, np.random.default_rng([seed, 3]))
@@ -253,9 +254,9 @@ def toml_data(robot: Robot, fit: Fit, seed: int) -> str:
 def summary(robot: Robot, fit: Fit) -> dict[str, Any]:
     """Return statistics of the fit over all motors.
 
-    "parameters": dict from each parameter to its unit, median, range and standard deviation, the published setting, and the largest
-    distance from it in standard deviations.  "encoder_noise": found and published noise [deg].  "residual": chi-square and largest misfit
-    [deg] of the fitted and of the held-out responses, with the motor that has it.
+    "parameters": dict from each parameter to its unit, median, range and median standard deviation, the published setting, and the largest
+    distance of a motor's value from this setting in standard deviations.  "encoder_noise": found and published noise [deg].  "residual":
+    median chi-square per degree of freedom, largest misfit [deg] and the motor that has it, for the fitted and for the held-out responses.
     """
     published, found = MotorParameters(), {}
     for name in FITTED:

@@ -40,9 +40,10 @@ class Fit:
     """Fitted values of n motors, and the quality of the fit.
 
     `parameters`: fitted motor parameters.  `deviation`: dict from a parameter's name ("lag", "delay", "backlash", "friction") to its
-    standard deviations (n,) in s, s, rad and rad/s.  `noise`: of the encoders, for ticks of 20 ms (NOISE_PERIOD), (n,) rad.  `chi_square`:
-    of the fitted responses per degree of freedom, (n,); 1 if only encoder noise remains.  `misfit`: rms residual of the mean fitted
-    response beyond the noise, (n,) rad.  `held_out_chi_square` and `held_out_misfit`: the same for signals that were not fitted.
+    standard deviations (n,) in s, s, rad and rad/s.  `noise`: standard deviation of the encoder noise, for ticks of 20 ms (NOISE_PERIOD),
+    (n,) rad.  `chi_square`: chi-square of the fitted responses per degree of freedom, (n,); 1 if the residuals are only encoder noise.
+    `misfit`: rms residual of the fitted mean response, without the part that noise explains, (n,) rad.  `held_out_chi_square` and
+    `held_out_misfit`: the same for signals that were not fitted.
     """
 
     parameters: MotorParameters
@@ -57,8 +58,8 @@ class Fit:
 def fit(robot: Robot, responses: Sequence[Responses], signals: tuple[Array, Array]) -> Fit:
     """Fit the motor model to the responses of all motors of a robot.
 
-    `responses`: of each motor, in the robot's order.  `signals`: the fitted and the held-out signal (ticks,) rad/s, the same for all
-    motors.
+    `responses`: of each motor, in the order of `robot.motors`.  `signals`: the commanded velocities, (ticks,) rad/s, of the fitted signal
+    and of the held-out signal, the same for all motors.
     """
     noise = np.array([_noise(each.fitted, each.held_out) for each in responses])  # at a tick of DT
     sigma = noise / np.sqrt(responses[0].fitted[..., 0].size)  # of the mean response
@@ -210,7 +211,8 @@ def synthetic(
 ) -> list[Responses]:
     """Return simulated responses, with encoder noise, of motors with these parameters, for each motor of the robot.
 
-    `seed`: of the noise.  `signals`: two signals (ticks,) rad/s.  `shape`: numbers of postures and of repetitions.
+    `seed`: of the noise.  `signals`: the fitted and the held-out signal, (ticks,) rad/s.  `shape`: number of postures, number of
+    repetitions.
     """
     rng = np.random.default_rng([seed, 2])
     sigma = NOISE * np.sqrt(NOISE_PERIOD / DT)

@@ -51,7 +51,7 @@ def fitted_signal() -> Array:
 
 
 def held_out_signal(rng: np.random.Generator) -> Array:
-    """Return a signal of random steps of random length, at least 4 s, (ticks,) rad/s.  It checks the fit and is not used in it."""
+    """Return a signal of at least 4 s, (ticks,) rad/s, with random steps of random lengths; it checks the fit and is not used in it."""
     parts, position = [_preload()], 0.0
     while sum(map(len, parts)) * DT < 4.0:
         speed, duration = np.deg2rad(rng.uniform(-40.0, 40.0)), rng.uniform(0.05, 0.4)
@@ -101,7 +101,7 @@ def prints_to_stderr() -> Iterator[None]:
 class Responses:
     """Encoder values [rad] of one motor at the beginning of every tick.
 
-    `fitted` and `held_out`: for the two signals, each (postures, repetitions, ticks).
+    `fitted` and `held_out`: responses to the fitted signal and to the held-out signal, each (postures, repetitions, ticks).
     """
 
     fitted: Array
@@ -109,9 +109,10 @@ class Responses:
 
 
 def postures(model: Model, motor: int, count: int, rng: np.random.Generator) -> Array:
-    """Return home and random postures around it, (count, n) rad, in which the motor has room for the signals.
+    """Return home and random postures around it, (count, n) rad, in which a motor has room for the signals.
 
-    It can move by 14 degrees (ROOM) to either side without a limit or a contact.  Raises InvalidValue if too few postures are found.
+    The motor can move by 14 degrees (ROOM) to either side without a limit or a contact; for this its position may differ from home.
+    `motor`: its index.  Raises InvalidValue if too few postures are found.
     """
     robot = model.robot
     low, high = robot.limits.T
@@ -132,8 +133,9 @@ def postures(model: Model, motor: int, count: int, rng: np.random.Generator) -> 
 def record(body: Backend, robot: Robot, motor: int, at: Array, signals: tuple[Array, Array], repetitions: int) -> Responses:
     """Command both signals to one motor of `body`, and return its responses.
 
-    `motor`: its index.  `at`: postures (postures, n) rad in which each signal starts.  `signals`: (ticks,) rad/s.  `repetitions`: in each
-    posture.  Raises InvalidValue if the robot cannot reach a posture.
+    `motor`: its index.  `at`: postures (postures, n) rad in which each signal starts.  `signals`: the fitted and the held-out signal,
+    (ticks,) rad/s.  `repetitions`: how often each signal is commanded in each posture.  Raises InvalidValue if the robot cannot reach a
+    posture.
     """
     shape = (len(at), repetitions)
     fitted, held_out = np.empty((*shape, len(signals[0]))), np.empty((*shape, len(signals[1])))

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Step responses: settling time and overshoot, and whether they depend on the control period.
 
-Claim: at all control periods of 1 to 20 ms, single motors and whole postures reach their targets and stay there, with the default gains
-within three and six seconds (steps of 20 degrees alone, of up to half a range together), with at most 5 % overshoot.  Source: thesis 5.2
+Claim: with the default gains, at all control periods of 1 to 20 ms, single motors reach their targets and stay there within three seconds
+(steps of 20 degrees), and whole postures within six seconds (steps of up to half a range), with at most 5 % overshoot.  Source: thesis 5.2
 (the dynamical system of eq. 5.7); its figures show no step response.  Published number: an action of an arm took some 9.6 s, 18 000 in two
 days, three agents at once (thesis 7.3).  Run time: a few minutes.
 
@@ -55,8 +55,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
     """Return the conditions of the sweep: every gain set, control period and step.
 
-    A step is one of a single motor or of a whole posture; motors that the gain set never moves have none.  Raises UnknownName for an
-    unknown motor, and InvalidValue for a period at which the control law is not stable.
+    A step is one of a single motor or of a whole posture; there are no steps of motors that the gain set never moves (weight 0).  Raises
+    UnknownName for an unknown motor, and InvalidValue for a period at which the control law is not stable.
     """
     known, periods, chosen, count = icub().robot.motors, arguments.periods, arguments.motors, arguments.postures
     if arguments.quick:
@@ -110,9 +110,9 @@ def _posture(number: int, seed: int) -> Array:
 def findings(found: Cells) -> dict[str, Any]:
     """Return the results as a dict from the gain set to a dict from the control period and "motors" or "postures" to numbers, and "passed".
 
-    The numbers are "steps" and "never_settled", and for "settling_time_s", "overshoot", "error_deg" and "rest_deg" a list of the median and
-    the worst value.  "each" says this.  "passed": whether all steps with the default gains settle, with at most 5 % overshoot, within 3 s
-    (single motor) or 6 s (posture); None if they were not run.
+    The numbers are the counts "steps" and "never_settled", and for "settling_time_s", "overshoot", "error_deg" and "rest_deg" a list of the
+    median and the worst value.  "each": the text "median and worst".  "passed": whether all steps with the default gains settle, with at
+    most 5 % overshoot, within 3 s (single motor) or 6 s (posture); None if the default gains were not run.
     """
     responses = _responses(found)
     table: dict[str, Any] = {}

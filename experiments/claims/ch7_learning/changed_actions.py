@@ -6,10 +6,11 @@ is as accurate as one that forgets nothing in a world that does not change.
 Source: aim of this reproduction, to thesis 7.2.6.  Published number: none.
 Run time: half a minute on 2 cores.
 
-A tabular world of the rank 3 lattice (81 states) with equidistant neighbours, in which every action succeeds.  After 2000 transitions a
-random state and two of its neighbours are blocked: all actions towards these states end in the state in which they began.  1000 more
-transitions follow.  The error of the model is the mean L1 distance between its probabilities, without imagined outcomes, and the true ones;
-it is computed for the actions into blocked states, and for all other actions.  In the other half of the runs nothing changes.
+The world is a table of outcomes: the lattice of rank 3 (81 states), with actions to the states one level away along one joint; every action
+succeeds.  After 2000 transitions a random state and two of its neighbours are blocked: all actions towards these states end in the state in
+which they began.  1000 more transitions follow.  The error of the model is the mean L1 distance between its outcome probabilities (by the
+observed counts, without the imagined outcomes of the prior) and the true ones; it is computed for the actions into blocked states, and for
+all other actions.  In half of the runs nothing changes.
 """
 
 from __future__ import annotations
@@ -66,11 +67,11 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Let one agent explore before and after the change, and measure the error of its model.
 
-    Returns `errors` (checks + 1, 2), the mean L1 errors before the first transition after the change and then after every 20 transitions:
-    column 0 of the changed actions (0 in a world that does not change), column 1 of all others.  `tries` is the mean number of tries of a
-    changed action since the change, divided by that of all actions that can be tried (1 in a world that does not change).  `settings`:
-    "agent", a key of AGENTS; "changed", whether the world changes; "before" and "after", numbers of transitions.  `seed`: of agent and
-    world.
+    Returns `errors` (checks + 1, 2), mean L1 errors against the outcomes after the change.  Row 0 is measured at the change, row i after 20
+    i more transitions.  Column 0: changed actions (0 in a world that does not change); column 1: all other actions.  `tries` is the mean
+    number of tries of a changed action since the change, divided by that of all actions that can be tried (1 in a world that does not
+    change).  `settings`: "agent", a key of AGENTS; "changed", whether the world changes; "before" and "after", numbers of transitions.
+    `seed`: of agent and world.
     """
     space, rng = arm_space(), np.random.default_rng([seed, 726])
     middle = int(rng.integers(len(space)))

@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Change the outcomes of some actions suddenly, and observe how agents with and without forgetting learn the new ones.
 
-Claim: when actions that had always ended in one state suddenly end in another, their value shoots up; the agent tries them a few times and
-so corrects its model.  Ours: an agent that forgets old counts should correct it sooner.
-Source: thesis 7.2.6 (where instabilities of the simulator were the cause, and few runs were examined).  Published number: none.
-Run time: 3 minutes on 2 cores.
+Claim: when actions that had always ended in one state suddenly end in another, their value rises sharply; the agent tries them a few times
+and so corrects its model.  Our own claim: an agent that forgets old counts corrects its model sooner.  Source: thesis 7.2.6 (where
+instabilities of the simulator were the cause, and few runs were examined).  Published number: none.  Run time: 3 minutes on 2 cores.
 
-The left arm on the lattice of rank 3.  After 3000 transitions a ball with a radius of 6 cm appears where the hand is in the middle state;
-or the friction of the elbow doubles from 4 deg/s, with which the joint arrives, to 8, with which it sticks.  3000 more transitions follow,
-from home.  With friction no action settles, because the controller continues to drive the motor: actions end after 8 s.  Walks through both
-worlds measure which actions changed.  The error of the model is the mean L1 error of its debiased counts over the actions that changed,
-relative to the error at the change, before the first transition after it.  Forgetting limits an action's counts to 1 / (1 - forgetting),
-and so keeps its reward above a bound: with 0.8 the action with most outcomes keeps the highest reward, and a curious agent tries few
-others.
+The left arm explores the lattice of rank 3 (81 states).  After 3000 transitions its world changes: either a ball with a radius of 6 cm
+appears where the hand is in the middle state, or the friction of the elbow doubles from 4 deg/s, with which the joint still reaches its
+goals, to 8 deg/s, with which it sticks.  3000 more transitions follow, from home.  With friction no action settles, because the controller
+continues to drive the motor; such actions end after 8 s.  Walks through both worlds, before and after the change, measure which actions
+changed.  The error of the model is the mean L1 error of its debiased counts (observed counts without the imagined outcomes of the prior)
+over the changed actions, divided by the error at the change.  Forgetting limits the sum of an action's counts to 1 / (1 - forgetting), and
+so keeps its reward above a bound: with the factor 0.8 the action with the most different outcomes always has the highest reward, and a
+curious agent seldom tries others.
 """
 
 from __future__ import annotations
@@ -170,9 +170,9 @@ def summary(values: dict[str, Any]) -> dict[str, Any]:
 class Run:
     """The results of one run: its model was checked after every 50 transitions, and the world changed in the middle.
 
-    `tried` (checks,): transitions with a changed action since the check before.  `series` (checks, 4): mean L1 error of changed and of
-    unchanged actions, then mean value [nats] of both.  `at_change`: error of the changed actions before the first transition after the
-    change.  `changed`, `same`: masks (S, A) of the changed and the unchanged actions.
+    `tried` (checks,): number of transitions with a changed action since the previous check.  `series` (checks, 4): mean L1 error of changed
+    and of unchanged actions, then mean value [nats] of both.  `at_change`: error of the changed actions before the first transition after
+    the change.  `changed`, `same`: masks (S, A) of the changed and the unchanged actions.
     """
 
     tried: Ints
@@ -188,7 +188,7 @@ class Run:
 
     @property
     def tries(self) -> Array:
-        """At each check, the mean tries of a changed action since the check before, divided by the mean tries of all actions, (checks,)."""
+        """Mean tries of a changed action since the previous check, divided by the mean tries of all actions, for each check, (checks,)."""
         relative: Array = self.tried / CHECK_PERIOD * arm_space().state_actions / self.changed.sum()
         return relative
 
@@ -241,7 +241,7 @@ class Run:
 
     @property
     def relearned_within(self) -> float:
-        """The number of transitions until the error is halved, at most all transitions after the change."""
+        """The same number as `relearned`, but with the number of all transitions after the change instead of inf."""
         return float(min(self.relearned, CHECK_PERIOD * (len(self.series) - self.checks_before)))
 
 

@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Let the curious agent discover the shoulder's cable constraints on a lattice of 81 states, with different discounts and priors.
 
-Claim: on 81 states and 432 actions every state-action is tried 5 times after 2987 actions (prior 50-50) or 2651 (60-40).  The states 24,
-51 and 78 are hard to enter, because some actions towards them fail.  Actions from these states are tried less often; the difference is
-smaller for agents that plan farther ahead (larger discount).  An agent that expects success (60-40) tries the failing actions most often.
-Source: thesis 7.2.2 to 7.2.5, figs. 7.4, 7.6 and 7.7; 5 runs per setting.  Run time: 2 minutes on 2 cores.
+Claim: on 81 states and 432 actions every state-action is tried 5 times after 2987 actions (prior 50-50: before any try, one imagined
+failure and one success) or after 2651 (prior 60-40: one failure and two successes).  The states 24, 51 and 78 are hard to enter, because
+some actions towards them fail.  Actions from these states are tried less often; the difference is smaller for agents that plan farther
+ahead (larger discount).  An agent that expects success (60-40) tries the failing actions most often.  Source: thesis 7.2.2 to 7.2.5, figs.
+7.4, 7.6 and 7.7; 5 runs per setting.  Run time: 2 minutes on 2 cores.
 
 The left arm with its cable constraints and self-contacts, from a random state; discounts 0.5, 0.9 and 0.99, both priors, until every
 state-action was tried 5 times.  A state-action fails when it does not end in its goal state.  Actions are written as source->goal, because
-the thesis numbers the state-actions without saying in which order.  The texts leave open at which speed an action has settled, and how
-strong the forces of the cables are: all runs are repeated with the ends of what the original programs suggest, 0.6 and 1.2 deg/s, and
-1300 deg/s^2.
+the thesis numbers the state-actions without saying in which order.  The texts do not say below which speed an action has settled, nor how
+strong the forces of the cable constraints are.  So all runs are repeated with the extreme values that the original programs suggest: settle
+speeds of 0.6 and 1.2 deg/s, and a largest force of 1300 deg/s^2.
 """
 
 from __future__ import annotations

@@ -1,21 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Put a cup beside a curious arm, let its state hold where the cup is, and let it push the cup to chosen cells.
+"""Put a cup beside a curious arm whose state contains the place of the cup, and let the arm push the cup to chosen cells.
 
-Claim: a curious agent whose state holds the place of a cup moves the cup more often than one for which the cup is a ghost; with what it has
-learned it pushes the cup to a chosen cell more often than by chance.
-Source: aim of this reproduction, the table discovery of paper 3.2 one step further.  Published number: none.
-Run time: 4 minutes of processor time.
+Claim: a curious agent whose state contains the place of a cup moves the cup more often than an agent that perceives only a ghost of the
+cup.  With what it has learned it pushes the cup to a chosen cell more often than by chance.  Source: aim of this reproduction, the table
+discovery of paper 3.2 one step further.  Published number: none.  Run time: 4 minutes of processor time.
 
-The left arm has 15 postures in which the hand is low above the table, the cup nine cells of 5 x 8 cm: 135 states, 396 actions.  The
-cup slides out of the hand (`mobee.SlidingObject`), and is put back to the middle when it topples or leaves the cells.  Its place is
-perceived with an error of 3 mm.  In all runs
-the same cup stands there and is pushed, and its pushes are counted.  The runs differ in what the agent perceives as the cup: the cup; a
-ghost that rests at the first place; a ghost with the motion of the cup in another run, which nothing that the agent does has caused.
-The replayed ghost is the stricter control: its agent has as many states, and as much to learn about, as the one that perceives the
-cup.  An action has moved the cup if it pushed it by more than 1 cm or made it fall.
-After 2000 actions, the agent plans with its transition model to push the cup from the middle to each of the five cells to which the hand
-can push it, each six times, with at most 20 actions.
---arrangements: also other postures, and twelve cells with the cup beside their middle.
+The left arm has 15 postures in which the hand is low above the table, and the cup can be in nine cells of 5 x 8 cm: 135 states, 396
+actions.  The contacts of hand and cup have no friction (`mobee.SlidingObject`), so that the cup slides off the hand; it is put back to the
+middle when it topples or leaves the cells.  Its place is perceived with an error of 3 mm.  In all runs a real cup stands there, and its
+motions are counted.  The runs differ in what the agent perceives as the place of the cup: the true place; a ghost that rests at the first
+place; or a ghost that repeats the motion of the cup in another run, so that the agent's actions do not cause it.  The replayed ghost is the
+stricter control: its agent has as many states, and as much to learn, as the one that perceives the cup.  An action has moved the cup if it
+pushed it by more than 1 cm or made it fall.  After 2000 actions, the agent plans with its transition model to push the cup from the middle
+to each of the five cells to which the hand can push it, each six times, with at most 20 actions.  --arrangements: also other postures, and
+twelve cells with the cup beside their middle.
 """
 
 from __future__ import annotations
@@ -79,9 +77,9 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Explore beside the cup, and then try to push the cup to chosen cells.
 
     Returns for each of the T actions whether it moved the cup, `moved` (T,), and whether the cup fell, `fell` (T,); `path`, the length of
-    the cup's path [m]; and for each try to push the cup to a cell whether it got there, by plans in `reached` (tries,), and in runs of the
-    random agent by random actions in `by_chance` (tries,).  `settings`: "arrangement", a key of ARRANGEMENTS; "agent", a key of AGENTS;
-    "transitions", their number; "tries", their number.  `seed`: of agent and plant.
+    the cup's path [m]; `reached` (tries,), for each try to push the cup to a chosen cell by plans, whether it got there; and, only for the
+    random agent, `by_chance` (tries,), the same for tries by random actions.  `settings`: "arrangement", a key of ARRANGEMENTS; "agent", a
+    key of AGENTS; numbers of "transitions" and of "tries".  `seed`: of agent and plant.
     """
     arrangement = ARRANGEMENTS[settings["arrangement"]]
     explorer, perceived = AGENTS[settings["agent"]]
@@ -134,9 +132,9 @@ ROW: dict[str, Callable[[Mapping[str, Any]], float]] = {
 
 
 def pushed(runs: Runs) -> dict[str, list[float]]:
-    """Return a dict from what chose the actions to the share of tries of each run in which the cup got to the chosen cell.
+    """Return for each kind of tries a list with one number per run: the share of the tries in which the cup got to the chosen cell.
 
-    The keys are "AGENT, then plans", for plans with what the agent has learned, and "random actions".
+    The kinds, keys of the dict, are "AGENT, then plans", for plans with the model that the agent has learned, and "random actions".
     """
     learned = {f"{agent}, then plans": group for agent, group in runs.items()}
     return of_each(learned, lambda run: float(run["reached"].mean())) | {

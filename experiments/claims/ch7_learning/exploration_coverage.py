@@ -7,13 +7,14 @@ Source: paper 3.1, fig. 4; thesis 7.2.1, fig. 7.5.
 Published number: AC/LT about 1/2, on the lattice of 81 states and their 16 nearest neighbours.
 Run time: 4 minutes on 2 cores.
 
-The left arm, with its cable constraints and self-contacts ("constrained") and without both ("free"), on the published graph of the 16
-nearest neighbours and, with the first 10 seeds, on that of the equidistant neighbours.  Ties among the 16 nearest are drawn anew for every
-seed, the same for all explorers, so that 50 seeds are 50 graphs.  Each explorer makes its own draws among equally good actions.  The texts
-do not name the discount of figure 4, so the curious agent also runs with 0.5 and 0.99.  The shortest walk has the fewest actions that try
-every action if all succeed (the open Chinese postman's walk).  A run stops after 20 000 transitions.  Besides the published explorers there
-are two of ours: the one that goes to the nearest untried action ("nearest untried"), and curiosity whose rewards are used up along its own
-plan ("depleting").
+The left arm explores, with its cable constraints and self-contacts ("constrained") and without both ("free"), on the published graph
+(actions to the 16 nearest states) and, with the first 10 seeds, on the graph of equidistant neighbours (states one level away along one
+joint).  If several states are equally near, a draw decides which of them are among the 16 nearest; this draw depends on the seed, but not
+on the explorer, so that 50 seeds have 50 graphs.  Each explorer makes its own draws among equally good actions.  The texts do not name the
+discount of figure 4, so the curious agent also runs with 0.5 and 0.99.  For comparison, the shortest walk needs the fewest actions to try
+every action, if all succeed (open Chinese postman problem).  A run stops after 20 000 transitions.  Two explorers are not published but
+ours: "nearest untried" moves to the nearest untried action; "depleting" is curiosity that expects an action's reward to fall with each try
+that its own plan contains.
 """
 
 from __future__ import annotations
@@ -213,7 +214,12 @@ def states_seen(run: Mapping[str, Any], transitions: int) -> int:
 
 
 def row(runs: Runs) -> dict[str, Any]:
-    """Return a dict from a label to a number for runs with the same settings: of runs, transitions, repeats, states and failures."""
+    """Summarise runs with the same settings.  Returns a dict from a label to a number.
+
+    The labels name the number of runs ("seeds") and of those that were "unfinished"; the mean number of "transitions" with the interval
+    "low" to "high", and the same mean "over_shortest_walk"; the "first_repeat" of an action; the states seen early; and the share of failed
+    actions.
+    """
     low, high = interval(covered(runs))
     return {
         "seeds": len(runs),

@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compare two information gains as rewards: the thesis' 'Kail' divergence, and the KL divergence from a uniform prior over all states.
 
-'Kail' divergence counts outcomes in bins whose number grows with the outcomes that were seen.
-Claim: with plain KL divergence from a uniform prior every first try has the same reward, so that many tries are needed to distinguish
-failing actions from reliable ones, and rewards are larger in small state spaces than in large ones; 'Kail' divergence has neither
-problem.  Source: thesis 6.4.2 and 6.4.3, eqs. 6.6 to 6.9, tables 6.1 to 6.4.  Run time: half a minute on 2 cores.
+'Kail' divergence counts outcomes in bins whose number grows with the outcomes that were seen.  Claim: with the plain KL divergence and a
+uniform prior every first try has the same reward, so that many tries are needed to distinguish failing actions from reliable ones; and
+rewards are larger in small state spaces than in large ones.  The 'Kail' divergence has neither problem.  Source: thesis 6.4.2 and 6.4.3,
+eqs. 6.6 to 6.9, tables 6.1 to 6.4.  Run time: half a minute on 2 cores.
 
-Computed: the rewards of a reliable, a failing and an uncertain action, try by try.  On the robot: the left arm with its constraints, 81
-states with 16 neighbours, for 4000 transitions, and the torso, 27 states with 8 neighbours, for 900; both divergences, all runs on one
-graph.  Failing actions are those that fail in more than half of the tries of all runs except the judged one.
+First the rewards of a reliable, a failing and an uncertain action are computed, try by try.  Then curious agents explore with both
+divergences: the left arm with its constraints (81 states with 16 neighbours) makes 4000 transitions, and the torso (27 states with 8
+neighbours) 900; all runs of a part have the same graph.  Failing actions are those that fail in more than half of the tries of all runs
+except the judged one.
 """
 
 from __future__ import annotations

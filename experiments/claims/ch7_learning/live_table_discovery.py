@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compare what three live agents learn at the table with what offline agents learn.
 
-Claim: the three agents of the table experiment, each a process of its own in the live system in lockstep, learn transition models
-that are statistically those of the same agents on the offline plant, and touch the table and lean towards it as often.  Source: aim of
-this reproduction (thesis 7.4 was done live).  Published number: none.  Run time: 10 minutes on 2 cores, and 13 for each live run.
+Claim: the three agents of the table experiment (`table_discovery`), each a process of the live system in lockstep, learn transition models
+that do not differ statistically from those of the same agents on the offline plant, and they touch the table and lean towards it as often.
+Source: aim of this reproduction (thesis 7.4 was done live).  Published number: none.  Run time: 10 minutes on 2 cores, and 13 for each live
+run.
 
-The robot `icub`, the published gains and graphs, whole-tree forces; live on its motor model, or with --robots on PyBullet or MuJoCo, for
-which the offline motors were identified.  Test: the total variation between the outcomes observed live and those of all offline seeds but
-one, mean over the state-actions that both tried at least twice, beside the same numbers of the offline seeds.  Touch: the share of the
-arms' actions that ended in contact with table or ball.  Lean: mean tries of the torso's actions that lean forward over those of its
-others.  Both of the second half of a run.
-With the same encoder noise both plants make the same run to the last bit (`mobee bench agree`); here they have different seeds.
+The robot is `icub` with the published gains and graphs; contact forces act on all motors up to the root of the robot.  The live robot is
+its motor model, or with --robots PyBullet or MuJoCo.  The models are compared by the total variation between the outcomes that were
+observed live and those of all offline seeds but one, mean over the state-actions that both tried at least twice; the same numbers are
+computed for each offline seed.  Touch is the share of the arms' actions that ended in contact with table or ball; lean is the mean number
+of tries of the torso's actions that lean forward, over that of its other actions; both are measured in the second half of a run.  With the
+same encoder noise the live and the offline plant make exactly the same run (`mobee bench agree`); here they have different seeds.
 """
 
 from __future__ import annotations
@@ -82,7 +83,7 @@ def offline_cells(arguments: argparse.Namespace) -> list[Cell]:
 def live_cells(arguments: argparse.Namespace) -> list[Cell]:
     """Return the cells (single runs) that learn on the live system: one for each robot and seed.
 
-    All robots run a seed before the next seed.  With --quick there is one seed.
+    The cells are ordered by seed, and then by robot.  With --quick there is one seed.
     """
     number, seeds = _transitions(arguments), range(LIVE_SEED, LIVE_SEED + (1 if arguments.quick else arguments.live_seeds))
     return [
@@ -144,7 +145,7 @@ class Run:
         return float(tries[forward].mean() / tries[~forward].mean())
 
     def contacts(self, part: str) -> Contacts:
-        """Return how many actions of a part missed their goals, ended in contact with an object, or both."""
+        """Return how many actions of a part there were, missed their goals, ended in contact with an object, and did both."""
         return Contacts.of(_spaces()[part], self.result.values[f"seen_{part}"], self.result.values[f"touched_{part}"])
 
 
@@ -166,7 +167,7 @@ def runs_in(folder: Path) -> Runs:
 
 
 def distances(runs: Runs) -> dict[str, list[Distance]]:
-    """Return a dict from the robot to how far the outcomes of each of its runs are from those of the offline runs.
+    """Return a dict from the robot (or "offline") to the distance of the outcomes in each of its runs from those in the offline runs.
 
     A distance has the mean total variation of the outcomes of an action, and the share of actions with the same most frequent outcome.  An
     offline run is compared with all other offline runs together.  A live run is compared with all offline runs except one, and the distance

@@ -1,17 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plan with the learned MDP, without obstacles, around a table that enters, and around one that moves up and down.
+"""Plan with the learned MDP: without obstacles, around a table that appears after training, and around one that moves up and down.
 
-Claim: most learned state-actions reliably take the arm to their goal, a few end elsewhere, always or sometimes (fig. 7).  The MDP needs no
-static workspace, while a PRM planner does.  A planner trained with dynamic obstacles plans around the regions where they tend to be.
-Source: paper 2, 3.1, 3.2.1, fig. 7; thesis 7.4.1.  Published: no numbers but the figure's seven state-actions that lead elsewhere.
-Run time: two minutes on 2 cores.
+Claim: most learned state-actions reliably take the arm to their goal; a few end elsewhere, always or sometimes (fig. 7).  The MDP does not
+need a static workspace, while a PRM planner does.  A planner trained with dynamic obstacles plans around the regions where they tend to be.
+Source: paper 2, 3.1, 3.2.1, fig. 7; thesis 7.4.1.  Published: no numbers but the figure's seven state-actions that lead elsewhere.  Run
+time: two minutes on 2 cores.
 
-The left arm of the published robot, 81 states with 16 neighbours.  The agent makes 4000 curious transitions without the table, or with a
-table that moves up or down at random after every ten actions; or 2000 without it before the table enters.  Plans use debiased counts, are
-made anew after each action, and learn nothing from the 60 queries.  In each query the raised table blocks the straight path between start
-and goal, but neither of them.  For comparison the same lattice is a roadmap that was verified without the table; it is planned once, or
-repaired when a motion fails, for this query ("repairs") or for all later ones too ("remembers").
-The seeds draw noise and queries; all runs share one graph.
+The left arm of the published robot learns on 81 states with 16 neighbours: 4000 curious transitions without the table ("still") or with a
+table that is moved up or down at random after every ten actions ("moving"); or 2000 transitions without the table before it is raised
+("enters").  Then the model is tested in 60 queries, pairs of a start and a goal state.  It learns nothing from them, and plans again after
+each action, with debiased counts (without the imagined outcomes of the prior).  In each query the raised table blocks the straight path
+between start and goal, but neither of them.  For comparison the same lattice is used as a roadmap that was verified without the table.  Its
+path is planned once, or the roadmap is repaired when a motion fails, only for this query ("repairs") or for all later queries too
+("remembers").  The seeds draw noise and queries; all runs share one graph.
 """
 
 from __future__ import annotations
@@ -168,7 +169,7 @@ def tested(runs: Runs, condition: str, test: str, measure: str, mode: str = "pla
 
 
 def entering(runs: Runs, forgetting: float) -> tuple[list[int], dict[str, Array]]:
-    """Return the numbers of transitions since the table entered, and the measures of plans after them.
+    """Return the numbers of transitions since the table was raised at which plans were tested, and the measures of these tests.
 
     `forgetting`: the factor with which the agents forget; 1: nothing is forgotten.  The measures are a dict from the name, as in `tested`,
     to values (seeds, points), a column for each number of transitions.

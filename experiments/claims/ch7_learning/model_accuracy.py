@@ -6,12 +6,12 @@ Claim: curiosity learns the stochastic actions better than least-tried explorati
 "data-efficient" (7.2.1) without measuring the model.  No numbers are published.  Run time: 3 minutes on 2 cores.
 
 The error of a state-action is the L1 distance, 0 to 2, between the believed and the true distribution of outcomes.  There are three worlds:
-the left arm on 81 and on 256 states (20-80 % of the ranges), with equidistant neighbours, and a tabular world, whose outcomes are known
-exactly.  In the tabular world a plane separates three of 81 states from the others ("half-space").  The arm's true outcomes are estimated
-by walks that try every action 80 or 40 times.  An action is stochastic if its most likely outcome has a probability below .9: none of 432
-on the arm with 81 states, some 25 of 1536 with 256, 13 of 432 in the half-space.  An estimate from so few tries has an error of its own,
-some .1 for two equally likely outcomes.  It is a lower bound of measured errors, and makes the ratios for stochastic actions of the arm too
-small.
+the left arm on 81 and on 256 states (20-80 % of the ranges), with equidistant neighbours (states one level away along one joint), and a
+world that is defined by a table of outcome probabilities, so that the truth is known exactly.  In this world a plane separates three of 81
+states from the others ("half-space").  The arm's true outcomes are estimated by walks that try every action 80 or 40 times.  An action is
+stochastic if its most likely outcome has a probability below .9: none of 432 on the arm with 81 states, some 25 of 1536 with 256, 13 of 432
+in the half-space.  An estimate of the truth from so few tries has an error itself, some .1 for two equally likely outcomes.  No measured
+error can be below it, so that ratios of errors are too small for the stochastic actions of the arm.
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Explore one world with an explorer or, to measure the true outcomes, by a walk.
+    """Explore one world with an explorer, or by a walk that tries every action equally often, to measure the true outcomes.
 
     Returns the transitions `seen` (T, 3): state, action, state reached.  `settings`: "world", a key of WORLDS; "explorer", its name, or
     "walk".  `seed`: of agent and plant, or of the walk.
@@ -138,9 +138,10 @@ def truths(found: Cells) -> dict[str, OutcomeModel]:
 def errors(found: Cells, known: Mapping[str, OutcomeModel]) -> dict[tuple[str, str], Array]:
     """Return a dict from (world, explorer) to the L1 errors of the models learned in each run, (seeds, times, columns).
 
-    `known`: the true outcomes by world; worlds that are absent are left out.  `times` returns the times, numbers of transitions.  Columns 0
-    and 1: errors with imagined outcomes, pseudo-counts from before the first try, over all and over stochastic actions; columns 2 and 3:
-    the same with debiased counts, which replace the pseudo-counts by a weak prior.
+    `known`: dict from a world to its true outcomes; runs in other worlds are left out.  The times are the numbers of transitions that the
+    function `times` returns.  Columns: 0, mean error over all actions, and 1, over the stochastic ones, of the counts with imagined
+    outcomes (pseudo-counts from before the first try); 2 and 3, the same with debiased counts, which replace the pseudo-counts by a weak
+    prior.
     """
     return {
         (world, explorer): np.array([error_curve(world, known[world], one["seen"]) for one in results])

@@ -4,11 +4,11 @@
 Claim: the published 16 neighbours per state are more than necessary; fewer connections would shorten the learning time.
 Source: paper 4.1 (an impression, no numbers).  Run time: 4 minutes on 2 cores.
 
-The left arm with its cable constraints and self-contacts; 81 states with actions to their 4 to 32 nearest neighbours (ties drawn anew
-for every seed) or to the equidistant ones.  The curious agent learns.  After fixed numbers of transitions, its model is tested in 60 tasks,
-random pairs of states, which are the same for all graphs: follow the plan until the arm is in the goal state, with at most 12 actions, on a
-robot with other noise.  A task is solved directly if it takes the fewest actions that its graph allows.  The learning time is the number of
-transitions until every state-action was tried once.
+The left arm with its cable constraints and self-contacts learns by curiosity on graphs of 81 states, with actions to the 4 to 32 nearest
+states (among equally near ones a draw decides, anew for every seed) or to the equidistant neighbours (states one level away along one
+joint).  After fixed numbers of transitions, its model is tested in 60 tasks, random pairs of states, which are the same for all graphs:
+follow the plan until the arm is in the goal state, with at most 12 actions, on a robot with other noise.  A task is solved directly if it
+takes the fewest actions that its graph allows.  The learning time is the number of transitions until every state-action was tried once.
 """
 
 from __future__ import annotations
@@ -192,10 +192,10 @@ def _fewer(grouped: Groups) -> dict[int, list[Run]]:
 
 @claim("paper 4.1", "fewer neighbours shorten learning: transitions until every action was tried once", "qualitative")
 def sooner(grouped: Groups) -> Measured:
-    """Judge whether every action is tried sooner, the fewer neighbours the states of a graph have, from the published 16 downwards.
+    """Judge whether the time until every action was tried is shorter, the fewer neighbours the states have, from 16 downwards.
 
-    Returns the learning times by graph as text, and the verdict.  It is None, open, if a run did not try every action, because the runs
-    that did are the faster ones.
+    Returns the learning times by graph as text, and the verdict.  The verdict is None (open) if some run did not try every action, because
+    then only the times of faster runs are known.
     """
     times = {graph: learning_times(runs) for graph, runs in _fewer(grouped).items()}
     middle = {graph: interquartile_mean(found) for graph, found in times.items() if found}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Queries of an arm around a table that moves up and down, and the execution of plans for them."""
+"""Queries (pairs of a start and a goal state) for an arm beside a table that moves up and down, and the execution of plans for them."""
 
 from __future__ import annotations
 
@@ -73,11 +73,13 @@ class FrozenModel:
         self._space, self._beliefs = space, beliefs
 
     def begin(self, goal: int) -> None:
-        """Plan to the goal state; as in `experiments.kit.learning.arm_planners.Rival.begin`."""
+        """Make a plan to the state `goal`; as in `experiments.kit.learning.arm_planners.Rival.begin`."""
         self.planner = Planner(self._space, self._beliefs, [goal])
 
     def aim(self, q: Array) -> Array | None:
-        """Return the sample (4,) rad to go to from the pose `q` (4,) rad; as in `experiments.kit.learning.arm_planners.Rival.aim`."""
+        """Return the next sample on the plan, (4,) rad, from the pose `q` (4,) rad; as in
+        `experiments.kit.learning.arm_planners.Rival.aim`.
+        """
         state = self._space.state_of(q)
         sample: Array = self._space.samples[self._space.goal(state, int(self.planner.policy[state]))]
         return sample
@@ -92,8 +94,8 @@ class FrozenModel:
 def roadmaps(plant: TablePlant, space: Lattice) -> dict[str, Rival]:
     """Return three planners that use the lattice as a roadmap, by name, verified with the table at its lower height.
 
-    "planned once" never replans.  "repairs" changes the roadmap where a motion failed, for the present query; "remembers" for all later
-    queries too.
+    "planned once" never plans again.  "repairs" changes the roadmap where a motion failed, only for the present query; "remembers" does
+    this for all later queries too.
     """
     plant.set_top(DOWN)
     belief = Belief(plant.inner.model, np.zeros(len(space.joints)), arm_clauses())
@@ -107,7 +109,7 @@ def roadmaps(plant: TablePlant, space: Lattice) -> dict[str, Rival]:
 class Queries:
     """The queries of a seed: `pairs` of a start state and a goal state of the lattice `space`.
 
-    `blocked` (S,): the states in which a field of the arm overlaps the raised table.
+    `blocked` (S,): whether the arm in the sample of a state touches the raised table, fields included.
     """
 
     space: Lattice
@@ -152,9 +154,9 @@ class Queries:
 
 
 def touched_states(plant: TablePlant, space: Lattice, top: float) -> NDArray[np.bool_]:
-    """Return which states (S,) have a sample that is in contact, or too near to a cable constraint, with the table at a height.
+    """Return for which states (S,) the arm in their sample has a contact, or is too near to a cable constraint.
 
-    `top`: height of the table's top [m].  The table stays there.
+    `top`: height of the table's top [m], to which the table is moved before; it stays there.
     """
     plant.set_top(top)
     return ~clear(plant.inner.model, space.samples, arm_clauses())
@@ -183,9 +185,9 @@ def drawn_pairs(plant: TablePlant, space: Lattice, count: int, seed: int) -> lis
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Followed:
-    """How well a planner led the arm through the queries; all numbers are means over the queries.
+    """How well a planner led the arm through the queries.
 
-    `paths`: the states of each query, from start to end.
+    `success`, `actions`, `touched` and `met`: see below.  `paths`: the visited states of each query, from its start to its end.
     """
 
     success: float
@@ -199,12 +201,12 @@ class Followed:
     paths: Paths
 
     def numbers(self) -> dict[str, float]:
-        """Return a dict with the fields `success`, `actions`, `touched` and `met`."""
+        """Return a dict with the values of `success`, `actions`, `touched` and `met`."""
         return {"success": self.success, "actions": self.actions, "touched": self.touched, "met": self.met}
 
 
 def follow(space: Lattice, rival: Rival, pairs: Sequence[tuple[int, int]], tops: Sequence[float], seed: int) -> Followed:
-    """Let a planner send the arm from the sample of a start state to a goal state, in each of the queries; return the measures.
+    """Let a planner lead the arm from the sample of a start state to a goal state in each query, and return the measures.
 
     `pairs`: start state and goal state of each query.  `tops`: height of the table's top in each query [m].  `seed`: of the plant's noise.
     The arm begins at rest.  A query ends at its goal state, after 20 actions (MAX_ACTIONS), or when the planner gives up.

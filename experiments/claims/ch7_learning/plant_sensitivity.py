@@ -7,10 +7,11 @@ findings.  They depend on the cable forces and on the thresholds below which an 
 little noise.
 Source: thesis 7.2.5, 7.3 (the findings); the study is ours.  Published number: none.  Run time: 15 minutes on 2 cores.
 
-The left arm explores with curiosity: 5000 actions on rank 4 (levels at 20-80 % of the ranges) and 3000 on rank 3 (25-75 %).  One parameter
-is changed at a time; its published value is in brackets.  The findings of rank 4 are reproduced if the four states are never reached, the
-other four at most 4 times each on average, all other states are reached, and 90 % of the tries of the three deflected actions end one pitch
-level higher; those of rank 3, if the three actions fail in half of their tries, and 21->24 in at most 10 %.
+The left arm explores with curiosity: 5000 actions on rank 4 (levels at 20-80 % of the ranges) and 3000 on rank 3 (25-75 %).  In each
+variant one parameter is changed; the name of the variant has its published value in brackets.  The findings of rank 4 are reproduced if the
+four states are never reached, the other four at most 4 times each on average, all other states are reached, and 90 % of the tries of the
+three deflected actions end one pitch level higher; those of rank 3, if the three actions fail in half of their tries, and 21->24 in at most
+10 %.
 """
 
 from __future__ import annotations
@@ -188,8 +189,8 @@ class Row:
     def rank4(self) -> bool:
         """Whether the published findings on the lattice of rank 4 (256 states) are reproduced (thesis 7.3).
 
-        They are: the four states of `never` and no others are never reached, those of `hardly` at most 4 times, and at least 90 % of the
-        tries of the actions of `deflected` are deflected.
+        They are reproduced if the four states of `never` and no others are never reached, each of the states of `hardly` at most 4 times on
+        average, and at least 90 % of the tries of the actions of `deflected` are deflected.
         """
         rare, deflected = self.hardly <= MAX_RARE_VISITS, self.deflected >= MIN_DEFLECTED
         return self.never == len(NEVER) and rare and self.others == 0 and deflected
@@ -198,7 +199,8 @@ class Row:
     def rank3(self) -> bool:
         """Whether the published findings on the lattice of rank 3 (81 states) are reproduced (thesis 7.2.5).
 
-        They are: at least half of the tries of the actions of `failing` fail, and at most 10 % of those of `entering`.
+        They are reproduced if at least half of the tries of the actions of `failing` fail, and at most 10 % of the tries of 21->24
+        (`entering`).
         """
         return self.failing >= MIN_FAILING and self.entering <= 1.0 - MIN_DEFLECTED
 

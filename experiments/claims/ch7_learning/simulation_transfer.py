@@ -5,14 +5,14 @@ Claim: the transition model learned offline, with motor parameters that were ide
 PyBullet's robot.  Source: an aim of this reproduction; the paper (4.1) says that the robot's time limits learning.
 Published: no number.  Run time: about fifteen minutes on 2 cores for the arms; the table as much again.
 
-Rank 3, four neighbours, the robot `icub` under the gains of 2014, curious agents of both arms at the same time; with --table also those of
-torso and arms at the table.  Live: all services in lockstep, with PyBullet; beside it MuJoCo and, for control, the motor model alone.
-Offline: the same agents with five other seeds.  Each of them is compared with the other four; this distance is the noise that a perfect
-copy would show too.  So a live robot is also compared with four of them at a time.  It is equal if its distance is below the 95 %
-prediction bound of one more offline seed, or below 0.01.  If that bound is more than 0.02 (the margin of equivalence) above the offline
-mean, the offline seeds differ too much for a verdict.  One live run can show that the models differ, but not that they are equivalent: then
-the claim stays open.
-Both engines simulate masses, contacts of solids and hard stops; the offline plant simulates motors and repulsive fields.
+Curious agents of both arms of the robot `icub` learn at the same time, on lattices of rank 3 with four neighbours, under the gains of 2014;
+with --table also agents of torso and arms at the table.  Live: all services run in lockstep, with PyBullet; for comparison also with MuJoCo
+and with the motor model alone.  Offline: the same agents learn with five other seeds.  Each offline seed is compared with the other four;
+this distance is the noise that a perfect copy would show too.  Therefore a live robot is also compared with four offline seeds at a time.
+It counts as equal if its distance is below 0.01, or below the bound under which the distance of one more offline seed would be with 95 %
+probability.  If this bound is more than 0.02 (the margin of equivalence) above the offline mean, the offline seeds differ too much for a
+verdict.  One live run can show that the models differ, but not that they are equivalent: then the claim stays open.  Both engines simulate
+masses, contacts of solids and hard stops; the offline plant simulates motors and repulsive fields.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def cells(arguments: argparse.Namespace) -> list[Cell]:
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
     """Learn on the offline plant and on each simulated robot, and return the results of the comparison.
 
-    Finished cells and transitions in the folder are not repeated.
+    Finished cells (single offline runs) and live transitions that the folder already has are not repeated.
     """
     run_cells(learn_offline, cells(arguments), folder, arguments)
     number = _transitions(arguments)

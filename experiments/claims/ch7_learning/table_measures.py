@@ -4,13 +4,14 @@
 A ghost of the table is an object at the same place that exerts no force.  Contact is computed from poses alone, in the same manner for the
 table and its ghost.
 
-A graph of 16 neighbours has preferred actions of its own, so tries are compared with those of the same agent at a ghost of the table.
+On a graph of 16 neighbours some actions are tried more often than others even without a table, so tries are compared with those of the same
+agent at the ghost.
 
-Contact is cyclic if the autocorrelation of the contact rate has a second peak, at a period, and that at a ghost has none.  High values at
-the first lags only mean that contacts come in bouts.
+Contact is cyclic if the autocorrelation of the contact rate at the table has a second peak, at the period, and the one at the ghost has
+none.  High values at the first lags only mean that contacts come in bouts.
 
 At a ghost no part disturbs another, except for hands that meet.  So an action that ends elsewhere at the table than at the ghost depends on
-the poses of the other parts (paper 4.4).  Which actions depend on them is computed from the runs of other seeds than the judged one.
+the poses of the other parts (paper 4.4).  For each judged run, this is computed from the runs of all other seeds.
 """
 
 from __future__ import annotations
@@ -319,7 +320,7 @@ def share_of_top(ratios: Array, chosen: NDArray[np.bool_]) -> float:
 def correlations(runs: Sequence[Run]) -> Array:
     """Return the autocorrelation of the contact rate of each run, (runs, lags).
 
-    The largest lag is a third of the run, so that the run contains at least three periods.
+    The largest lag is a third of the run, so that the run contains at least three periods of any cycle that is found.
     """
     return np.array([autocorrelation(run.touch_rate, len(run.touch_rate) // PERIODS) for run in runs])
 
@@ -383,7 +384,7 @@ class Judged:
 
     @property
     def at_all(self) -> float:
-        """The precision, equal to the recall, if as many actions are called dependent as really depend on other parts."""
+        """The precision, which equals the recall, if as many actions are called dependent as really depend on other parts."""
         return float(self.hits[:, : int(self.hits[0].sum())].mean())
 
     @property

@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compare the 'Kail' curiosity with the explorers of the literature, in worlds of tables from the literature.
 
-Claim: none is tested.  The question is how soon each explorer has tried everything, and how much reward it finds, where nothing is known
-in advance.
-Source: none; the thesis compares with random and least-tried actions only.  Run time: 5 minutes on 2 cores.
+Claim: none is tested.  The question is how soon each explorer has tried every action, and how much reward it finds, if the outcomes are not
+known in advance.  Source: none; the thesis compares with random and least-tried actions only.  Run time: 5 minutes on 2 cores.
 
 Worlds: RiverSwim with 6 and 20 states, DeepSea of depth 10, four rooms with slipping steps, and random worlds in which every action has
 five outcomes.  All explorers know the number of states and actions, and nothing of an action before its first try.
 
-Coverage: there is no reward; transitions until every state-action that can be reached was tried once and five times, and the distance (L1,
-0 to 2) of the believed outcomes (`debiased`, the same for all) from the true ones after 20 transitions for each state-action. Return:
-rewards are found by trying; the sum of all rewards over that of the best policy.  Each explorer has one number to choose, the same in all
-worlds: the weight of the rewards beside the gain in nats, the bonus, the tries until an action is known, the steps of an episode, the share
-of random actions.  They were set in advance and not tuned, except that of R-MAX: it is 10, because a first run with 3 gave up in RiverSwim;
-`--tune` measures others, with seeds of its own.
+Two tasks are measured.  "coverage", without rewards: the number of transitions until every reachable state-action was tried once, and five
+times; and the L1 distance (0 to 2) of the believed outcomes (`debiased`, for all explorers) from the true ones, after 20 transitions for
+each state-action.  "return": the sum of all rewards, over that of the best policy; the explorers must find the rewards by trying.  For
+"return" each explorer has one parameter, with the same value in all worlds: the weight of the rewards relative to the information gain in
+nats ("curious"), the size of the bonus ("count bonus"), the tries after which an action counts as known ("R-MAX"), the steps of an episode
+("PSRL"), or the share of random actions ("epsilon-greedy").  The values were set in advance and not tuned, except for R-MAX: its value is
+10, because with 3 it gave up in RiverSwim in a first run.  `--tune` measures other values, with other seeds.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ Runs = Sequence[Mapping[str, Any]]  # values by seed, of one condition
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the option --tune: instead of the usual runs, measure the return with three numbers for each explorer."""
+    """Add the option --tune: instead of the usual runs, measure the return with three values of the parameter of each explorer."""
     parser.add_argument("--tune", action="store_true", help="instead: the return with every number of each explorer, with other seeds")
 
 
@@ -101,13 +101,13 @@ def _condition(task: str, world: str, explorer: str, number: float = 0.0, seeds:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Explore one world, either until everything was tried ("coverage") or for rewards ("return").
+    """Explore one world, either until every action was tried ("coverage") or for rewards ("return").
 
-    "coverage" returns `pairs`, the number of actions in reachable states; `once` and `often`, transitions until each was tried once and
-    five times, at most `most`; `finished`, whether each of both was achieved; and `error`, the L1 error of the beliefs.  "return" returns
-    `best`, the mean reward per action under the best policy; `share`, the mean reward divided by it; and `earned`, the sum of rewards at
-    100 times.  `settings`: "task"; "world", a key of WORLDS; "explorer"; and for "return" its parameter "number".  `seed`: of agent and
-    world.
+    "coverage" returns `pairs`, the number of actions in reachable states; `once` and `often`, the numbers of transitions until all of them
+    were tried once, and five times, or `most`, the limit, if they were not; `finished`, two booleans, whether they were tried once, and
+    five times; and `error`, the L1 error of the beliefs.  "return" returns `best`, the mean reward per action under the best policy;
+    `share`, the mean reward divided by it; and `earned`, the sum of rewards at 100 times.  `settings`: "task"; "world", a key of WORLDS;
+    "explorer"; and for "return" its parameter "number".  `seed`: of agent and world.
     """
     world = WORLDS[settings["world"]](seed)
     plant = RewardedPlant(world, seed)
@@ -222,8 +222,8 @@ def findings(found: Cells) -> dict[str, Any]:
     """Return the results as a dict with the keys "runs" and "mean_share_of_the_best_return".
 
     "runs" is a dict from "task, world, explorer" to a row; each measure in it is a list of the interquartile mean and its interval.  For
-    the task "coverage": "once" and "often", the transitions until all was tried, "error", and numbers of runs ("seeds", "finished_once" and
-    "finished_often"); for "return": "share" (the reward as a share of the best policy's reward) and "seeds".
+    the task "coverage": "once" and "often", the transitions until every action was tried once and five times, "error", and numbers of runs
+    ("seeds", "finished_once" and "finished_often"); for "return": "share" (the reward as a share of the best policy's reward) and "seeds".
     "mean_share_of_the_best_return" is a dict from the explorer and the value of its parameter to this share, as a mean over the worlds.
     """
     rows: dict[str, Any] = {}

@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Find the states of a large lattice that the arm never reaches, and the states in which actions towards them end.
 
-Claim: of 256 states at 20, 40, 60 and 80 % of the joints' ranges the agent never reaches 60, 124, 188 and 252, and hardly ever 61, 125, 189
-and 253, although it tries hundreds of times, because the shoulder's cables deflect the arm: 57->61 ends in 62, 121->125 in 126, 249->253 in
-254.  In a lattice stretched to 12.5 and 87.5 % far more states are unreachable.  The arm often touches its own body, and reaches its goal
-nevertheless.
-Source: thesis 7.3, figs. 7.8 and 7.9; one run each, 14 597 and 26 963 actions.  Run time: 3 minutes on 2 cores.
+Claim: of 256 states at 20, 40, 60 and 80 % of the joints' ranges the agent never reaches the states 60, 124, 188 and 252, and hardly ever
+61, 125, 189 and 253, although it tries hundreds of times.  The reason is that the shoulder's cables deflect the arm: the action 57->61 ends
+in 62, 121->125 in 126, and 249->253 in 254.  In a lattice stretched to 12.5 and 87.5 % far more states are unreachable.  The arm often
+touches its own body, and reaches its goal nevertheless.  Source: thesis 7.3, figs. 7.8 and 7.9; one run each, 14 597 and 26 963 actions.
+Run time: 3 minutes on 2 cores.
 
-The left arm from a random state, prior 50-50, discount 0.9.  An action touches the own body if the fields of two links overlap at any time
-during it.  States are numbered with pitch varying fastest, then roll, yaw and elbow; source->goal is the action between two states.
+The left arm explores by curiosity from a random state, with prior 50-50 (one imagined failure and one success) and discount 0.9.  An action
+touches the robot's own body if the fields of two links overlap at any time during it.  States are numbered with pitch varying fastest, then
+roll, yaw and elbow; source->goal is the action between two states.
 """
 
 from __future__ import annotations
@@ -205,8 +206,8 @@ def findings(found: Cells) -> dict[str, Any]:
 
     "lattices": a row of numbers, such as "states_never_reached" and "share_of_failed_actions".  "states never reached": the states, by the
     share of the runs in which they were not reached.  "end states of deflected actions, times per run": for actions of the small lattice,
-    the states in which they ended, with their numbers.  "self-contacts": the result of `contacts_by_pair`.  If not both lattices were run
-    in full, all claims stay unmeasured and are not judged.
+    the states in which they ended, and how often per run.  "self-contacts": the result of `contacts_by_pair`.  If not both lattices were
+    run in full, all claims stay unmeasured and are not judged.
     """
     runs = runs_of(found)
     whole = all(lattice in runs and len(runs[lattice][0].seen) == actions for lattice, actions in ACTIONS.items())
@@ -256,7 +257,7 @@ def _ends(runs: Sequence[Run], source: int, goal: int) -> dict[str, float]:
 
 
 def contacts_by_pair(runs: Sequence[Run]) -> dict[str, dict[str, float]]:
-    """Return, for each pair of links that touched in some run, numbers of the actions in which it touched.
+    """Return, for each pair of links that touched in some run, a dict of numbers about the actions in which it touched.
 
     The numbers are "actions_per_run", "deepest_mm", the deepest overlap, and "share_that_succeeds", the share that ended in their goals.
     The pairs with most actions come first.

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Robot files by other authors: of 2010 to 2014, of today's robots, and URDFs in general."""
+"""Robot files by other authors: files of MoBeE from 2010 to 2014, files of today's robots, and URDF files in general."""

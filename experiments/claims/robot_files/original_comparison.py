@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Comparison, pose by pose, of two readings of an original robot file: by this library and by the rules of the program of 2014."""
+"""Compares, pose by pose, how this library and how the MoBeE program of 2014 read a robot file of 2010 to 2014."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ SHRINKAGE = 1e-4  # m; a contact that ends when the volumes are smaller by this 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Differences between this library's reading of a file and that by the rules of 2014; the counts are 0 where they agree.
+    """Differences between two readings of a robot file: by this library, and by the rules of the MoBeE program of 2014.
 
     `poses`: number of compared poses.  `position_error`: largest distance between the positions of a volume's centre or a marker [m].
-    `rotation_error`: largest difference of a component of a direction: normals of markers, height axes and faces of volumes.  Counts of
-    differences: `pairs`, pairs of volumes that only one reading tests; `base`, volumes that only one reading tests against the world;
-    `clauses`, clauses (constraints on several joints) that hold in a pose by one reading only; `contacts`, contacts that only one reading
-    finds.  `all_contacts`: number of all contacts, in all poses.
+    `rotation_error`: largest difference of a component of a unit vector: normals of markers, height axes of volumes and axes of boxes.
+    Counts of differences, 0 if the readings agree: `pairs`, pairs of volumes that only one reading tests; `base`, volumes that only one
+    reading tests against the world; `clauses`, clauses (constraints on several joints) that hold in a pose by one reading only; `contacts`,
+    contacts that only one reading finds.  `all_contacts`: number of all contacts, in all poses.
     """
 
     poses: int

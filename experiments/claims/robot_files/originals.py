@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Originals: whether this library reads the robot and world files of 2010 to 2014 as the programs of that time did.
 
-Claim: at least 95 % of the distinct files in the public histories of kailfrank/MoBeE and Juxi/icVision load as they are, and places,
-normals, limits, pairs, clauses and contacts are those of the program of 2014, by a second reading of its source (program_2014.py).  Source:
-kailfrank/MoBeE (2014), Juxi/icVision (2010 to 2013); thesis 2.3.1.  Run time: three minutes with 20 poses a file.
+Claim: at least 95 % of the distinct files in the public histories of kailfrank/MoBeE and Juxi/icVision load as they are.  Positions,
+normals of markers, motor limits, tested pairs of volumes, clauses (constraints on several joints) and contacts are those of the program of
+2014; program_2014.py states its rules again, from its source.  Source: kailfrank/MoBeE (2014), Juxi/icVision (2010 to 2013); thesis 2.3.1.
+Run time: three minutes with 20 poses a file.
 
 The files are not part of this project.  Fetch the two repositories, and give the folder that holds them:
 
@@ -87,8 +88,9 @@ def results(folder: Path) -> dict[str, Any]:
     """Write the table of the run in `folder`, and return the counts of its files.
 
     Keys: "files", "robots" and "load", numbers of files; "share", of files that load; "compared" and "agree", numbers of robots that were
-    compared, and whose readings agree; "poses" and "contacts", numbers of those that were compared in all; "table", path of the table;
-    "passed", whether at least 95 % of the files load and all compared robots agree.  Raises InvalidValue if no file was read yet.
+    compared, and of those whose two readings agree; "poses" and "contacts", numbers of poses and of contacts, summed over the compared
+    robots; "table", path of the table; "passed", whether at least 95 % of the files load and all compared robots agree.  Raises
+    InvalidValue if no file was read yet.
     """
     rows = read_records(folder / RECORDS, COLUMNS)
     if not rows:
@@ -162,9 +164,9 @@ def write_table(rows: list[dict[str, str]], path: Path) -> None:
 
 
 def figure(folder: Path) -> Path:
-    """Draw the iCub of 2014, VirtualSkin's iCub, the Katana and the table world to a file in `folder`; returns its path.
+    """Draw the iCubs of MoBeE (2014) and of VirtualSkin (2011), the Katana and the table world to a file in `folder`; returns its path.
 
-    Raises InvalidValue if one of the files is missing.
+    VirtualSkin is the predecessor of MoBeE.  Raises InvalidValue if one of the robot or world files is missing.
     """
     files, path = folder / "files", folder / "originals.png"
     icub, skin = _robot(files, ICUB), _robot(files, VIRTUAL_SKIN)

@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Own robots: whether URDFs by other authors work as they are, without expert knowledge.
 
-Claim: each of 28 robots with 4 to 300 motors stays within 0.5 degrees or 1 mm of its home.  None touches itself at home, if the pairs of
-links that touch there are excluded by a file that `mobee check --write-srdf` has written.  Each prismatic joint settles within 1 mm of goals
-from 5 to 95 % of its range.  To read the robot's file and make 250 curious actions of an arm takes at most 15 s.
+Claim: each of 28 robots with 4 to 300 motors stays within 0.5 degrees or 1 mm of its home.  None touches itself at home, if a file that
+`mobee check --write-srdf` has written excludes the pairs of links that touch there.  Each prismatic joint settles within 1 mm of goals from
+5 to 95 % of its range.  To read the robot's file and make 250 curious actions of an arm takes at most 15 s.
 Source: aims of this reproduction; the thesis has one robot.  Published number: none.  Run time: 5 minutes.
 
 The robots are those of example-robot-data 6.0.0 and pybullet_data, and four extreme ones: a chain of 200 joints, a star of 300, and an arm
-six orders of magnitude too small and one three too large.  They have default gains and the motors of the offline plant, in an empty world,
-without fields.  Home and actions are also measured with fields of 3 cm; their drift is printed and not judged, because fields that overlap
-at home push the robot.  The joints' true positions count; of a prismatic joint also the encoder's.  Times are those of this machine.  The
-figure is a table in Markdown.
+six orders of magnitude too small and one three too large.  They have default gains, the motors of the offline plant, an empty world and no
+fields (volumes around the links, which exert forces but are not solid).  The drift from home and the curious actions are also measured with
+fields of 3 cm; that drift is printed but not judged, because fields that overlap at home push the robot.  Errors are those of the true
+joint positions; for a prismatic joint the error of its encoder value counts too.  Times are those of this machine.  The figure is a table
+in Markdown.
 """
 
 from __future__ import annotations
@@ -99,8 +100,9 @@ def results(folder: Path) -> dict[str, Any]:
 
     "robots": number of robots that could be read.  "failed": dict from the name of a robot to a list of short texts about the parts of the
     claim that it does not meet, as in `failures`.  "refused": dict from the name of a robot that could not be read to the reason.  "touch
-    themselves at home" and "and with the SRDF" (a file that lists pairs not to be tested): numbers of robots.  "worst_..." and
-    "longest_...": the worst values, None without robots.  "passed": whether no robot failed or was refused, None without robots.
+    themselves at home" and "and with the SRDF": numbers of robots with contacts at home, without and with the written SRDF, a file that
+    lists pairs of links not to be tested.  "worst_..." and "longest_...": the worst values, None without robots.  "passed": whether no
+    robot failed or was refused, None without robots.
     """
     found, refused = read(folder), read_records(folder / REFUSED, ("robot", "why"))
     failed = {one.robot: failures(one) for one in found if failures(one)}
@@ -147,13 +149,13 @@ def table(found: Sequence[Measured]) -> list[str]:
 class Measured(Row):
     """The measurements of one robot; -1 where there is nothing to measure.
 
-    `motors`, `slides` and `shapes`: numbers of motors, of prismatic motors, and of shapes.  `touching`: solid contacts at home before an
-    SRDF is written.  `written`: number of pairs written to the SRDF, a file that lists pairs not to be tested; `touching_after`: contacts
-    with it; `srdf_s`: time to write it [s].  `drift_deg`, `drift_mm`: largest distance of revolute and prismatic motors from home, while
-    home is the attractor for 10 s.  `slide_mm`: worst error of a prismatic joint over its range; `unsettled`: number of actions of
-    prismatic joints that timed out.  `actions_s`: time from the file to the end of 250 curious actions [s]; `solid`: how many of these
-    actions ended with solids in contact.  `field_drift_deg`, `field_actions_s`, `field_solid`: the same as the names without "field_", for
-    the robot with fields (volumes that are not solid) of 3 cm.
+    `motors`, `slides` and `shapes`: numbers of motors, of prismatic motors, and of shapes.  `touching`: number of solid contacts at home
+    before an SRDF is written.  `written`: number of pairs written to the SRDF, a file that lists pairs of links not to be tested;
+    `touching_after`: number of contacts at home with this SRDF; `srdf_s`: time to write it [s].  `drift_deg`, `drift_mm`: largest distance
+    of a revolute and of a prismatic motor from home, while home is the attractor for 10 s.  `slide_mm`: worst error of a prismatic joint
+    over its range; `unsettled`: number of actions of prismatic joints that timed out.  `actions_s`: time from the file to the end of 250
+    curious actions [s]; `solid`: how many of these actions ended with solids in contact.  `field_drift_deg`, `field_actions_s`,
+    `field_solid`: the same as the names without "field_", for the robot with fields (volumes that are not solid) of 3 cm.
     """
 
     PLACES = 4
@@ -246,7 +248,7 @@ def _slide(model: Model, index: int, seed: int) -> tuple[float, int]:
 def arm_of(robot: Robot) -> list[str]:
     """Return the names of up to four (ARM_JOINTS) revolute motors of one part, for an agent.
 
-    First come those of the longest chain of joints, from the base on, then other motors of the same part.
+    First come motors of one of the longest chains of joints, in order from the base, then other motors of the same part.
     """
     chains: list[list[int]] = [[]]
     drive = {joint: k for k, motor in enumerate(robot.motor_table) for joint, _, _ in motor.joints}

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The rules of the program of 2014, from a second reading of its source: a reference that shares nothing with mobee.robot.
+"""The rules by which the MoBeE program of 2014 read robot files, written again from its source; no code is shared with mobee.robot.
 
-It reads files of 2011 to 2014 with the standard library's parser and keeps every <link> and <joint> as a node of a tree, as the program did
-(kailfrank/MoBeE: zphandler, kintreenode, transformable, linearconstraint).  Positions in [m], angles in [deg], as in a file.
+The module reads files of 2011 to 2014 with the standard library's XML parser, and makes every <link> and <joint> a node of a tree, as the
+program did (kailfrank/MoBeE: zphandler, kintreenode, transformable, linearconstraint).  Positions are in m, angles in degrees, as in a
+file.
 """
 
 from __future__ import annotations
@@ -24,8 +25,8 @@ Array = NDArray[np.float64]
 class Volume:
     """A collision volume on a node of the tree.
 
-    `kind`: "sphere", "cylinder" or "box".  `size`: radius; radius and height; or three edges [m].  `position` (3,) m and `rotation` (3, 3):
-    relative to the start of the node.
+    `kind`: "sphere", "cylinder" or "box".  `size` [m]: (radius,) of a sphere, (radius, height) of a cylinder, or the three edges of a box.
+    `position` (3,) m and `rotation` (3, 3): pose relative to the start of the node.
     """
 
     kind: str
@@ -39,8 +40,8 @@ class Node:
     """A <link> or <joint> of a file, as a node of the tree.
 
     `axis`: vector from start to end of a link [m], or rotation axis of a joint, (3,).  `limits`: of a joint [deg].  `motor`: name of the
-    motor of a joint.  `solids` and `fields`: its volumes.  `hand`: the node at or above this one with noSelfCollision="true"; None without
-    one.
+    motor of a joint.  `solids` and `fields`: its solid volumes, and those that are not solid.  `hand`: the node with noSelfCollision="true"
+    in whose subtree this one is, which may be the node itself; None without such a node.
     """
 
     is_link: bool
@@ -147,7 +148,7 @@ class Program:
             self.clauses.append(rows)
 
     def poses(self, q: dict[str, float]) -> dict[Node, Array]:
-        """Return a dict from every node to its transform (4, 4), translations in m.
+        """Return a dict from every node to the transform (4, 4) from its start to the root frame, translations in m.
 
         `q`: a dict from the name of a motor to its position [deg].
         """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Comparison of one URDF file with another reading of it: Pinocchio's frames and shapes, and coal's contacts of exact convex hulls."""
+"""Compares how this library and Pinocchio read a URDF file: frames of links, and contacts, which coal computes from Pinocchio's shapes."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ class FileRecord(Row):
     `outcome`: "loads", "thing" (no joint moves, so it is no robot), "refused" or "crash".  `message`: why it was refused, crashed or not
     compared.  `links`: number of links whose frames were compared.  `srdf`: name of the SRDF that was found; `home`: name of the pose in
     it.  `seconds`: time to load, with default options.  `frame_error`: largest difference of an element of a link's frame from Pinocchio's
-    [m or 1].  `contacts`: pairs of links that touch in all poses, by the collision library coal; `other`: pairs that touch, by more than
-    1e-6 m, by coal or by this library only; `deepest_other`: depth of the deepest of these [m].  `at_home`: solid contacts at home, with
-    default options; `at_home_without`: the same without an SRDF.
+    [m or 1].  `contacts`: number of pairs of links that touch by the collision library coal, summed over all poses; `other`: the same for
+    pairs that touch, by more than 1e-6 m, by coal or by this library only; `deepest_other`: largest depth of a contact that only one of
+    them finds [m].  `at_home`: number of solid contacts at home, with default options; `at_home_without`: the same without an SRDF.
     """
 
     PLACES = None  # frames differ by 1e-16

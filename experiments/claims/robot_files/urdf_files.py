@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """URDF files by other authors: whether they load, and whether frames and contacts agree with Pinocchio and coal.
 
-Claim: a URDF of others loads as it is, or is refused with the line and a remedy; the frames of all links agree with Pinocchio's within
-1e-9, and with exact hulls the pairs of links that touch agree with coal's, in every pose.  Source: none; our own aim (docs/robots.md).  Run
-time: about five minutes for 181 files.
+Claim: a URDF file by others loads as it is, or is refused with a message that names the line and a remedy.  In every pose the frames of all
+links agree with Pinocchio's within 1e-9, and, with exact convex hulls of the meshes, the same pairs of links touch as by the collision
+library coal.  Source: none; our own aim (docs/robots.md).  Run time: about five minutes for 181 files.
 
-Without --folders, the files of icub_models, pybullet_data (without random_urdfs), mujoco and example-robot-data are compared, as far as
-these packages are installed.  The results of each file are written before the next file is compared, and --resume continues after them.  At
-the end the table is in the run's folder as urdf-files.md.  Pinocchio reads each file by itself, shapes and meshes included.
+Without --folders, the files of the packages icub_models, pybullet_data (without random_urdfs), mujoco, robosuite, dm_control and
+example-robot-data are compared, as far as these are installed.  The results of each file are written before the next file is compared, and
+--resume continues after them.  At the end the table is in the run's folder as urdf-files.md.  Pinocchio reads each file by itself, shapes
+and meshes included.
 """
 
 from __future__ import annotations
@@ -79,7 +80,7 @@ def read_all(path: Path) -> list[FileRecord]:
 def results(found: Sequence[FileRecord]) -> dict[str, Any]:
     """Return the results of all files.
 
-    Keys: "sets", dict from the name of a set of files, or "all", to the dict that `numbers` returns for it; "refused",
+    Keys: "sets", dict from the name of a set of files, or "all", to the dict that `numbers` returns for it; "refused" (or crashed),
     "contacts_that_differ" and "not_compared", dicts from the name of a file to a text that says why or how much; "passed", whether no file
     crashes, frames differ by at most 1e-9, and no contact differs.
     """
@@ -159,10 +160,11 @@ def figure(folder: Path) -> Path:
 
 
 def numbers(found: Sequence[FileRecord]) -> dict[str, Any]:
-    """Return numbers of the given files: counts of files, links and contacts, the largest frame error, and times to load [s].
+    """Summarise the given files: return counts of files, links and contacts, the largest frame error, and times to load [s].
 
-    Main keys: "load", "things" (no joint moves), "refused" and "crashes", numbers of files; "links", with compared frames; "contacts", by
-    the collision library coal; "other_contacts", by coal or by this library only; "touch_at_home", number of robots with contacts at home.
+    Main keys: "load", "things" (no joint moves), "refused" and "crashes", numbers of files; "links", number of links whose frames were
+    compared; "contacts", number of contacts by the collision library coal; "other_contacts", number of those that only coal or only this
+    library finds; "touch_at_home", number of robots with contacts at home.
     """
     loaded = [one for one in found if one.outcome == "loads"]
     compared = [one for one in loaded if one.contacts >= 0]

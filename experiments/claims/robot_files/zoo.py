@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The zoo: whether robots by other authors become curious without an edit, and how deep they touch themselves while they explore.
+"""The zoo: whether robots by other authors explore by curiosity with their files as they are, and how deep they touch themselves meanwhile.
 
-Claim: every robot of six collections loads as it is, gets arms, joints, home, pairs and fields from `mobee.derive`, touches nothing at
-home, touches itself no deeper than 2 mm in ten minutes of curiosity with the derived gains, and its agent tries every action of the states
-that it comes to; or one line says what it cannot do.  Source: aims of this reproduction; the thesis has one robot.  Published number: none.
-Run time: 15 seconds for each robot.
+Claim: every robot of six collections loads as it is.  `mobee.derive` computes its arms with their joints, its home, the tested pairs and
+the fields.  The robot touches nothing at home.  In ten minutes of curious exploration with the derived gains it touches itself no deeper
+than 2 mm.  A single agent tries every action of the states that it visits.  For a robot that fails, one line of the table says in what.
+Source: aims of this reproduction; the thesis has one robot.  Published number: none.  Run time: 15 seconds for each robot.
 
 The collections are icub_models, pybullet_data, example-robot-data (URDF), robosuite, dm_control and kinova (MJCF); kinova are the robots of
 other makers in the package dm_control.  --folders names the collections; without it, the packages that are installed are searched, and
@@ -54,11 +54,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 class Measured(Row):
     """The measurements of one robot.
 
-    `arms`: names of the parts that learn.  `joints`: numbers of their joints.  `errors`, `warnings`: numbers of findings of `mobee check`
-    about what was derived.  `at_home`: contacts at home, of solids and fields.  `load_s`, `derive_s`: times to load the file and to derive
-    arms, limits and fields from it [s].  `transitions`: number while all arms learn.  `depth_mm`: depth of the deepest solid contact;
-    `touching`: the two solids.  One arm also learns alone: `tried`, state-actions that its agent has tried; `can_be_tried`, the actions of
-    all states that it has visited; `state_actions`, all.
+    `arms`: names of the parts that learn.  `joints`: how many joints each of them has.  `errors`, `warnings`: numbers of findings of `mobee
+    check` about the derived robot.  `at_home`: number of contacts at home, of solids and fields.  `load_s`, `derive_s`: times to load the
+    file and to derive arms, limits and fields from it [s].  `transitions`: number of observed transitions while all arms learn at once.
+    `depth_mm`: depth of the deepest solid contact meanwhile; `touching`: names of the two solids.  One arm also learns alone: `tried`,
+    number of state-actions that its agent has tried; `can_be_tried`, number of actions of all states that it has visited; `state_actions`,
+    number of all state-actions.
     """
 
     robot: str
@@ -106,7 +107,7 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 def robot_files(folders: dict[str, Path], only: str) -> Iterator[tuple[str, Path]]:
     """Yield the name (ASCII) and the path of every URDF and MJCF file in the folders.
 
-    `folders`: by the name of their set.  `only`: text that the name must contain.
+    `folders`: dict from the name of a set of files to its folder.  `only`: text that the name must contain.
     """
     for name, folder in folders.items():
         for path in sorted((*folder.rglob("*.urdf"), *folder.rglob("*.xml"))):
@@ -211,11 +212,11 @@ def failures(one: Measured) -> list[str]:
 def results(folder: Path) -> dict[str, Any]:
     """Return the results of the run in `folder`.
 
-    Main keys: "robots": number of robots that were measured; "within 2 mm" and "tried all that can be tried": numbers of those whose
-    contacts stay so shallow, and whose single agent tried all its actions; "meet the claim": number of robots without a failure; "cannot":
-    dict from the name of a robot that does not meet the claim to a text that says what it cannot do; "refused": dict from the name of a
-    file that could not be used to the reason; "no robots": number of files that hold nothing that can learn; "passed": whether all robots
-    meet the claim, None if no robot was measured.
+    Main keys: "robots": number of robots that were measured; "within 2 mm": number of robots whose contacts stay so shallow; "tried all
+    that can be tried": number of robots whose single agent tried every action of the states that it visited; "meet the claim": number of
+    robots without a failure; "cannot": dict from the name of a robot that does not meet the claim to a text that says what it cannot do;
+    "refused": dict from the name of a file that could not be used to the reason; "no robots": number of files that hold nothing that can
+    learn; "passed": whether all robots meet the claim, None if no robot was measured.
     """
     found, refused = read(folder), read_refused(folder)
     failed = {one.robot: "; ".join(failures(one)) for one in found if failures(one)}

@@ -128,7 +128,7 @@ class PosteriorSampling:
 
     def __call__(self, agent: Explorable, state: int, rng: np.random.Generator) -> Array:
         """Return the score of each action of a state, (A,): its value in the present sampled world."""
-        if agent.transitions % self.episode == 0:
+        if agent.transitions % self.episode == 0 or not len(self._values):
             tries, counts = agent.model.tries, all_counts(agent)
             drawn = rng.standard_gamma(counts + 1.0 / counts.shape[2])
             drawn /= drawn.sum(axis=2, keepdims=True)

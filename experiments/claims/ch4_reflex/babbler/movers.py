@@ -27,7 +27,7 @@ _M = TypeVar("_M", bound=Message)
 class PartStreams(Generic[_M]):
     """The newest message of one class from each part; in lockstep (every tick waits for all participants) that of the current tick.
 
-    `newest`: the messages, by part.  `cls`: the class of message.  A new run removes all messages.
+    `newest`: the messages, by part.  `cls`: the class of message.  When the robot starts a new run, all messages are removed.
     """
 
     def __init__(self, service: Service, robot: Robot, cls: type[_M]) -> None:
@@ -125,7 +125,7 @@ class AtDrives:
 
 
 class AtGoals:
-    """Sends postures as goals to the controller; the next posture follows when the motion of every part has ended."""
+    """Sends random postures as goals to the controller; the next posture follows when the motions of all parts have ended."""
 
     def __init__(self, service: Service, robot: Robot, targets: Targets, note: Callable[[Commanded], None]) -> None:
         """`targets`: the random postures.  `note` is called with every command that has ended."""
