@@ -4,8 +4,9 @@
 Claim: no gains that a seeded search finds are clearly better than `Gains.default()` by the criteria of `Judged`: settling time and
 overshoot; depths of solid contacts while the hands are commanded 5 to 25 cm below the table's top, while a client pushes, and while the
 robot moves between random postures; chatter of the hands at the table with commands that are one, three and four ticks old, at 100 Hz; and
-violated constraints.  Source: this project's goals for MoBeE 2.0 (thesis 5.2).  Published number: none, the thesis has no criteria.  Run
-time: half an hour for 100 gain sets.
+violated constraints.
+Source: this project's goals for MoBeE 2.0 (thesis 5.2).  Published number: none, the thesis has no criteria.  Run time: half an hour for
+100 gain sets.
 
 The first gain set that is judged is `Gains.default()` itself.  Each later set changes one to three values of the best set so far by random
 factors; the spread of these factors grows after a success and shrinks after a failure.  The result is a table of the default and the best
@@ -142,7 +143,7 @@ class Pressed:
 
 
 def press_targets(count: int) -> list[Array]:
-    """Draw `count` postures (n,) rad in which a palm is 5 to 25 cm below the table's top, and which have no contacts if there is no table."""
+    """Draw `count` postures (n,) rad with a palm 5 to 25 cm below the table's top, and without contacts if there is no table."""
     robot = icub_at_table().robot
     rng, free = np.random.default_rng(PRESS_SEED), icub()
     found: list[Array] = []

@@ -4,7 +4,8 @@
 Claim: the motor model of `mobee.simulation`, with parameters that are fitted to the encoder readings of the PyBullet robot, describes that
 robot, gravity and inertia included: the residuals of the responses are only encoder noise.  Source: thesis 2.2 (the robot does not follow
 its commands exactly).  No parameters are published; the fit is compared with the published setting, the parameters with which the published
-findings are reproduced.  Run time: five minutes on a quiet machine, nearly all of it PyBullet's.
+findings are reproduced.
+Run time: five minutes on a quiet machine, nearly all of it PyBullet's.
 
 The robot is a black box: velocities are its inputs, noisy encoder positions its outputs.  First the method is checked on simulated motors
 with known parameters.  Signals that are not used in the fit check the result.  At the end an arm makes the same actions with PyBullet and

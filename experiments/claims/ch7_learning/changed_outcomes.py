@@ -2,8 +2,9 @@
 """Change the outcomes of some actions suddenly, and observe how agents with and without forgetting learn the new ones.
 
 Claim: when actions that had always ended in one state suddenly end in another, their value rises sharply; the agent tries them a few times
-and so corrects its model.  Our own claim: an agent that forgets old counts corrects its model sooner.  Source: thesis 7.2.6 (where
-instabilities of the simulator were the cause, and few runs were examined).  Published number: none.  Run time: 3 minutes on 2 cores.
+and so corrects its model.  Our own claim: an agent that forgets old counts corrects its model sooner.
+Source: thesis 7.2.6 (where instabilities of the simulator were the cause, and few runs were examined).  Published number: none.
+Run time: 3 minutes on 2 cores.
 
 The left arm explores the lattice of rank 3 (81 states).  After 3000 transitions its world changes: either a ball with a radius of 6 cm
 appears where the hand is in the middle state, or the friction of the elbow doubles from 4 deg/s, with which the joint still reaches its

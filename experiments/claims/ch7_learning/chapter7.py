@@ -2,8 +2,8 @@
 """Run all experiments of chapter 7 one after the other, with their figures.
 
 Claim: the thesis' experiments in model learning can be repeated, with all figures, by one command.  Source: thesis chapter 7, paper section
-3.  Published number: the robot took over two days for the longest of them (7.4).  Run time: 23 minutes on 2 cores.  --all adds the
-experiments that thesis and paper only propose, and our own studies: 45 minutes.
+3.  Published number: the robot took over two days for the longest of them (7.4).
+Run time: 23 minutes on 2 cores.  --all adds the experiments that thesis and paper only propose, and our own studies: 45 minutes.
 
 Every experiment has its own folder in the folder of the run, as if it had been run alone.  An interrupted experiment continues; one that
 fails writes failed.txt and does not stop the others.  With --resume and more --seeds, finished experiments continue too.  Afterwards,

@@ -2,18 +2,20 @@
 """Put a cup beside a curious arm whose state contains the place of the cup, and let the arm push the cup to chosen cells.
 
 Claim: a curious agent whose state contains the place of a cup moves the cup more often than an agent that perceives only a ghost of the
-cup.  With what it has learned it pushes the cup to a chosen cell more often than by chance.  Source: aim of this reproduction, the table
-discovery of paper 3.2 one step further.  Published number: none.  Run time: 4 minutes of processor time.
+cup.  With what it has learned it pushes the cup to a chosen cell more often than by chance.
+Source: aim of this reproduction, the table discovery of paper 3.2 one step further.  Published number: none.
+Run time: 4 minutes of processor time.
 
 The left arm has 15 postures in which the hand is low above the table, and the cup can be in nine cells of 5 x 8 cm: 135 states, 396
 actions.  The contacts of hand and cup have no friction (`mobee.SlidingObject`), so that the cup slides off the hand; it is put back to the
 middle when it topples or leaves the cells.  Its place is perceived with an error of 3 mm.  In all runs a real cup stands there, and its
 motions are counted.  The runs differ in what the agent perceives as the place of the cup: the true place; a ghost that rests at the first
-place; or a ghost that repeats the motion of the cup in another run, so that the agent's actions do not cause it.  The replayed ghost is the
-stricter control: its agent has as many states, and as much to learn, as the one that perceives the cup.  An action has moved the cup if it
-pushed it by more than 1 cm or made it fall.  After 2000 actions, the agent plans with its transition model to push the cup from the middle
-to each of the five cells to which the hand can push it, each six times, with at most 20 actions.  --arrangements: also other postures, and
-twelve cells with the cup beside their middle.
+place; or a ghost that repeats the motion of the cup in another run, so that the agent's actions do not cause it.
+The replayed ghost is the stricter control: its agent has as many states, and as much to learn, as the one that perceives the cup.  An
+action has moved the cup if it pushed it by more than 1 cm or made it fall.
+After 2000 actions, the agent plans with its transition model to push the cup from the middle to each of the five cells to which the hand
+can push it, each six times, with at most 20 actions.
+--arrangements: also other postures, and twelve cells with the cup beside their middle.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Measure after how many transitions an explorer has tried every state-action.
 
-Claim: the curious agent (AC in the paper) has tried all state-actions in about half the time of the agent that takes the action least
-tried (LT); the random agent (RAND) needs far longer.  At first, AC and LT try only new actions.
+Claim: the curious agent (AC in the paper) has tried all state-actions in about half the time of the agent that takes the action least tried
+(LT); the random agent (RAND) needs far longer.  At first, AC and LT try only new actions.
 Source: paper 3.1, fig. 4; thesis 7.2.1, fig. 7.5.
 Published number: AC/LT about 1/2, on the lattice of 81 states and their 16 nearest neighbours.
 Run time: 4 minutes on 2 cores.

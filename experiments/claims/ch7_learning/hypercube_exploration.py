@@ -2,14 +2,16 @@
 """Explore a hypercube of 16 states, in which every action succeeds, with the curious agent.
 
 Claim: on the hypercube of 16 states and 64 actions all actions succeed; every action is tried at least 5 times after little more than the
-smallest possible number of transitions; tries and values become uniform; and the values grow with the discount factor.  Source: thesis 7.1,
-figs. 7.2 and 7.3, table 7.1; the rewards of table 6.2.  Published number: 320 actions (64 x 5).  Run time: 10 seconds on 2 cores.
+smallest possible number of transitions; tries and values become uniform; and the values grow with the discount factor.
+Source: thesis 7.1, figs. 7.2 and 7.3, table 7.1; the rewards of table 6.2.  Published number: 320 actions (64 x 5).
+Run time: 10 seconds on 2 cores.
 
 The left arm with its cable constraints and self-contacts, from a random state; discounts 0.5, 0.9 and 0.99, and both initialisations of the
 counts (50-50: one imagined failure and one success; 60-40: one failure and two successes), because thesis 7.1 names none.  Numbers are
-those of 50-50 unless stated otherwise.  Tries and values are recorded after 50 transitions and at the end.  The relative variance of tries
-is their variance divided by that of a uniformly random choice among 64 actions: 1 for a random choice, 0 for equal tries.  The limit of the
-value is mean reward / (1 - discount), the value of earning the mean reward indefinitely.
+those of 50-50 unless stated otherwise.
+Tries and values are recorded after 50 transitions and at the end.  The relative variance of tries is their variance divided by that of a
+uniformly random choice among 64 actions: 1 for a random choice, 0 for equal tries.  The limit of the value is mean reward / (1 - discount),
+the value of earning the mean reward indefinitely.
 """
 
 from __future__ import annotations

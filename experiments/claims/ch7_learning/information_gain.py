@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compare two information gains as rewards: the thesis' 'Kail' divergence, and the KL divergence from a uniform prior over all states.
 
-'Kail' divergence counts outcomes in bins whose number grows with the outcomes that were seen.  Claim: with the plain KL divergence and a
-uniform prior every first try has the same reward, so that many tries are needed to distinguish failing actions from reliable ones; and
-rewards are larger in small state spaces than in large ones.  The 'Kail' divergence has neither problem.  Source: thesis 6.4.2 and 6.4.3,
-eqs. 6.6 to 6.9, tables 6.1 to 6.4.  Run time: half a minute on 2 cores.
+'Kail' divergence counts outcomes in bins whose number grows with the outcomes that were seen.
+Claim: with the plain KL divergence and a uniform prior every first try has the same reward, so that many tries are needed to distinguish
+failing actions from reliable ones; and rewards are larger in small state spaces than in large ones.  The 'Kail' divergence has neither
+problem.  Source: thesis 6.4.2 and 6.4.3, eqs. 6.6 to 6.9, tables 6.1 to 6.4.  Run time: half a minute on 2 cores.
 
 First the rewards of a reliable, a failing and an uncertain action are computed, try by try.  Then curious agents explore with both
 divergences: the left arm with its constraints (81 states with 16 neighbours) makes 4000 transitions, and the torso (27 states with 8

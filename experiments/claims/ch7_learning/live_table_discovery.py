@@ -7,11 +7,12 @@ Source: aim of this reproduction (thesis 7.4 was done live).  Published number: 
 run.
 
 The robot is `icub` with the published gains and graphs; contact forces act on all motors up to the root of the robot.  The live robot is
-its motor model, or with --robots PyBullet or MuJoCo.  The models are compared by the total variation between the outcomes that were
-observed live and those of all offline seeds but one, mean over the state-actions that both tried at least twice; the same numbers are
-computed for each offline seed.  Touch is the share of the arms' actions that ended in contact with table or ball; lean is the mean number
-of tries of the torso's actions that lean forward, over that of its other actions; both are measured in the second half of a run.  With the
-same encoder noise the live and the offline plant make exactly the same run (`mobee bench agree`); here they have different seeds.
+its motor model, or with --robots PyBullet or MuJoCo; the motor parameters of the offline plant were identified on PyBullet.  The models are
+compared by the total variation between the outcomes that were observed live and those of all offline seeds but one, mean over the
+state-actions that both tried at least twice; the same numbers are computed for each offline seed.  Touch is the share of the arms' actions
+that ended in contact with table or ball; lean is the mean number of tries of the torso's actions that lean forward, over that of its other
+actions; both are measured in the second half of a run.
+With the same encoder noise the live and the offline plant make exactly the same run (`mobee bench agree`); here they have different seeds.
 """
 
 from __future__ import annotations
@@ -145,7 +146,7 @@ class Run:
         return float(tries[forward].mean() / tries[~forward].mean())
 
     def contacts(self, part: str) -> Contacts:
-        """Return how many actions of a part there were, missed their goals, ended in contact with an object, and did both."""
+        """Return counts of a part's actions: all, those that missed their goals, those that ended in contact with an object, and both."""
         return Contacts.of(_spaces()[part], self.result.values[f"seen_{part}"], self.result.values[f"touched_{part}"])
 
 

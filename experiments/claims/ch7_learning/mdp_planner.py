@@ -3,8 +3,8 @@
 
 Claim: most learned state-actions reliably take the arm to their goal; a few end elsewhere, always or sometimes (fig. 7).  The MDP does not
 need a static workspace, while a PRM planner does.  A planner trained with dynamic obstacles plans around the regions where they tend to be.
-Source: paper 2, 3.1, 3.2.1, fig. 7; thesis 7.4.1.  Published: no numbers but the figure's seven state-actions that lead elsewhere.  Run
-time: two minutes on 2 cores.
+Source: paper 2, 3.1, 3.2.1, fig. 7; thesis 7.4.1.  Published: no numbers but the figure's seven state-actions that lead elsewhere.
+Run time: two minutes on 2 cores.
 
 The left arm of the published robot learns on 81 states with 16 neighbours: 4000 curious transitions without the table ("still") or with a
 table that is moved up or down at random after every ten actions ("moving"); or 2000 transitions without the table before it is raised
@@ -12,7 +12,8 @@ table that is moved up or down at random after every ten actions ("moving"); or 
 each action, with debiased counts (without the imagined outcomes of the prior).  In each query the raised table blocks the straight path
 between start and goal, but neither of them.  For comparison the same lattice is used as a roadmap that was verified without the table.  Its
 path is planned once, or the roadmap is repaired when a motion fails, only for this query ("repairs") or for all later queries too
-("remembers").  The seeds draw noise and queries; all runs share one graph.
+("remembers").
+The seeds draw noise and queries; all runs share one graph.
 """
 
 from __future__ import annotations

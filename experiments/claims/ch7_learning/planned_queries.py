@@ -77,9 +77,7 @@ class FrozenModel:
         self.planner = Planner(self._space, self._beliefs, [goal])
 
     def aim(self, q: Array) -> Array | None:
-        """Return the next sample on the plan, (4,) rad, from the pose `q` (4,) rad; as in
-        `experiments.kit.learning.arm_planners.Rival.aim`.
-        """
+        """Return the next sample on the plan from the pose `q`, both (4,) rad; as in `experiments.kit.learning.arm_planners.Rival.aim`."""
         state = self._space.state_of(q)
         sample: Array = self._space.samples[self._space.goal(state, int(self.planner.policy[state]))]
         return sample
@@ -185,9 +183,9 @@ def drawn_pairs(plant: TablePlant, space: Lattice, count: int, seed: int) -> lis
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Followed:
-    """How well a planner led the arm through the queries.
+    """How well a planner led the arm through the queries: four measures over all queries, and the paths.
 
-    `success`, `actions`, `touched` and `met`: see below.  `paths`: the visited states of each query, from its start to its end.
+    `paths`: the visited states of each query, from its start to its end.
     """
 
     success: float

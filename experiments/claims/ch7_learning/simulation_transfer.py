@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compare the transition model learned on the offline plant with that learned on PyBullet's robot.
 
-Claim: the transition model learned offline, with motor parameters that were identified on PyBullet and then frozen, is that of
-PyBullet's robot.  Source: an aim of this reproduction; the paper (4.1) says that the robot's time limits learning.
+Claim: the transition model learned offline, with motor parameters that were identified on PyBullet and then frozen, is that of PyBullet's
+robot.  Source: an aim of this reproduction; the paper (4.1) says that the robot's time limits learning.
 Published: no number.  Run time: about fifteen minutes on 2 cores for the arms; the table as much again.
 
 Curious agents of both arms of the robot `icub` learn at the same time, on lattices of rank 3 with four neighbours, under the gains of 2014;
@@ -11,8 +11,8 @@ and with the motor model alone.  Offline: the same agents learn with five other 
 this distance is the noise that a perfect copy would show too.  Therefore a live robot is also compared with four offline seeds at a time.
 It counts as equal if its distance is below 0.01, or below the bound under which the distance of one more offline seed would be with 95 %
 probability.  If this bound is more than 0.02 (the margin of equivalence) above the offline mean, the offline seeds differ too much for a
-verdict.  One live run can show that the models differ, but not that they are equivalent: then the claim stays open.  Both engines simulate
-masses, contacts of solids and hard stops; the offline plant simulates motors and repulsive fields.
+verdict.  One live run can show that the models differ, but not that they are equivalent: then the claim stays open.
+Both engines simulate masses, contacts of solids and hard stops; the offline plant simulates motors and repulsive fields.
 """
 
 from __future__ import annotations

@@ -2,15 +2,15 @@
 """Let three independent agents, of torso and arms, explore near a table that an arm reaches only when the torso bends forward.
 
 Claim: over time the agents bend forward, put the arms low and touch the table more and more often, in cycles.  They try most often the
-actions whose outcomes depend on another part, both arms the same ones; such an action ends in a handful of states.  Source: paper 3.2 and
-4.4, figs. 8 to 10; thesis 6.4, 7.4, figs. 7.10 to 7.12; one run of 18 000 transitions a learner in "a little more than two full days".  Run
-time: 9 minutes on 2 cores; with --part more than twice as long.
+actions whose outcomes depend on another part, both arms the same ones; such an action ends in a handful of states.
+Source: paper 3.2 and 4.4, figs. 8 to 10; thesis 6.4, 7.4, figs. 7.10 to 7.12; one run of 18 000 transitions a learner in "a little more
+than two full days".  Run time: 9 minutes on 2 cores; with --part more than twice as long.
 
 Torso (27 states, 8 neighbours) and arms (81 states, 16 neighbours, one graph for both) at a table 50 cm thick.  Counts of tries alone say
 little, because on a graph of 16 neighbours some actions are tried more often than others even without a table, and all runs share one
 graph.  So each explorer also runs with a ghost of the table, which exerts no force, and tries are compared with those at the ghost.  An
-action of an arm touches the table if a field of the arm is within 2 cm of the table, or of the ghost, when it ends.  --part: contact forces
-act only up to the root of a part, as in the original program, so that the table exerts no force on the torso.
+action of an arm touches the table if a field of the arm is within 2 cm of the table, or of the ghost, when it ends.
+--part: contact forces act only up to the root of a part, as in the original program, so that the table exerts no force on the torso.
 """
 
 from __future__ import annotations

@@ -2,7 +2,8 @@
 """Compare the 'Kail' curiosity with the explorers of the literature, in worlds of tables from the literature.
 
 Claim: none is tested.  The question is how soon each explorer has tried every action, and how much reward it finds, if the outcomes are not
-known in advance.  Source: none; the thesis compares with random and least-tried actions only.  Run time: 5 minutes on 2 cores.
+known in advance.
+Source: none; the thesis compares with random and least-tried actions only.  Run time: 5 minutes on 2 cores.
 
 Worlds: RiverSwim with 6 and 20 states, DeepSea of depth 10, four rooms with slipping steps, and random worlds in which every action has
 five outcomes.  All explorers know the number of states and actions, and nothing of an action before its first try.

@@ -4,8 +4,8 @@
 Claim: of 256 states at 20, 40, 60 and 80 % of the joints' ranges the agent never reaches the states 60, 124, 188 and 252, and hardly ever
 61, 125, 189 and 253, although it tries hundreds of times.  The reason is that the shoulder's cables deflect the arm: the action 57->61 ends
 in 62, 121->125 in 126, and 249->253 in 254.  In a lattice stretched to 12.5 and 87.5 % far more states are unreachable.  The arm often
-touches its own body, and reaches its goal nevertheless.  Source: thesis 7.3, figs. 7.8 and 7.9; one run each, 14 597 and 26 963 actions.
-Run time: 3 minutes on 2 cores.
+touches its own body, and reaches its goal nevertheless.
+Source: thesis 7.3, figs. 7.8 and 7.9; one run each, 14 597 and 26 963 actions.  Run time: 3 minutes on 2 cores.
 
 The left arm explores by curiosity from a random state, with prior 50-50 (one imagined failure and one success) and discount 0.9.  An action
 touches the robot's own body if the fields of two links overlap at any time during it.  States are numbered with pitch varying fastest, then

@@ -1,31 +1,34 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Change the world after a reach learner has learned in it, and measure what it loses and how soon it is back.
+"""Change the world after an agent has learned to reach in it, and measure how much of its score it loses and how soon it recovers.
 
-Claim: a learner that detects changes, and sees its hand and the objects, is back at .95 of the score of an oracle that knows the new world
-within 60 problem-tries, with at most 2 failed transitions per evaluation, and loses nothing in a world that does not change.
+Claim: a learner that detects changes, and sees its hand and the objects, recovers within 60 problem-tries (attempts to reach one target):
+its score is .95 of the score of an oracle, an agent that knows the new world, and at most 2 transitions fail per evaluation.  In a world
+that does not change it loses nothing.
 Source: aim of this reproduction, to thesis 7.2.6, where actions "suddenly brought the robot somewhere else".  Published: no numbers.
 Run time: 45 minutes on 2 cores.
 
-The arm, targets, law and recommended learner of the experiment reach-predictors, at a table.  After 200 problem-tries a ball with a radius
-of 10 cm appears, the table is raised by 8 cm, or each joint is miscalibrated by 5 degrees; or nothing changes.  The 20 balls were drawn
-uniformly in the workspace, at least 12 cm from each target and away from the robot at home.  They are the first that cost a learner without
-a detector 15 % of its score or more, and leave at least three quarters of an oracle's score.  With each ball all seeds are run, and a
-result with balls is computed from the 20 means over the seeds: it is about balls, which differ more than seeds.
+The arm, the targets, the control law and the recommended learner are those of the experiment reach-predictors, at a table.  After 200
+problem-tries a ball with a radius of 10 cm appears, the table is raised by 8 cm, or each joint is miscalibrated by 5 degrees; or nothing
+changes.  There are 20 positions of the ball.  They were drawn uniformly in the workspace, at least 12 cm from each target and away from the
+robot at home; the first 20 were taken with which a learner without a detector loses 15 % of its score or more, and an oracle keeps at least
+three quarters of its score.  All seeds are run with each ball.  A result with balls is computed from the 20 means over the seeds, because
+results differ more between balls than between seeds.
 
-The oracle of the new world plans as the learners do, but it knows the reward of one reach from each state for each target, and the
-transitions that failed in at least one of two tries without a target.  Failures due to targets it has learned in three tries of each.  As
-its rewards are single samples, a learner can exceed its score.  With the ball number 12 the oracle's score is far too low (.83, while
-learners have 4.6): the oracle gets into states from which it knows no failures, because the robot entered them in no measurement, and stays
-there.  The interquartile mean leaves this ball out.  The oracle's encoders are as wrong as the learners'.
+The oracle of the new world plans as the learners do, but it knows one measured reward of a reach from each state for each target, and the
+transitions that failed in at least one of two tries without a target.  It has learned which transitions fail because of a target in three
+tries of each target.  As its rewards are single samples, a learner can exceed its score.  With the ball number 12 the oracle's score is far
+too low (.83, while learners have 4.6): it enters states that the robot entered in no measurement, so that it knows no failures there, and
+cannot leave them.  The interquartile mean leaves this ball out.  The oracle's encoders have the same errors as the learners'.
 
-There are five learners.  Four have no detector; a fixed rate, by which a change is assumed after every 100 outcomes; a generalised
-likelihood ratio of two windows; or the posterior over run lengths.  The fifth has the detector by run lengths, too, and sees.  It sees its
-hand after each action, with an error of 5 mm along each axis (standard deviation), and its plant corrects the encoders by this
-(`mobee.vision.calibration.self_calibration`).  During evaluations the hand is not seen, because they measure what was known before.  The
-learner also sees an object that appears or has moved, with an error of 1 cm along each axis, and of 5 mm in the radius of a ball.  Then it
-first makes 300 problem-tries on a simulated robot in the world as it is seen (`ReachAgent.practise`); they do not count among the 60.  The
-simulator is that of the robot itself, so that only the errors of the object and the noise differ: this shows what perception is worth, not
-what a wrong model of the robot costs.  All learners are judged by the true place of the hand.
+There are five learners.  The first has no detector of changes; the second assumes a change after every 100 outcomes; the third detects
+changes by a generalised likelihood ratio of two windows, and the fourth by the posterior over run lengths (numbers of outcomes since the
+last change).  The fifth has the same detector as the fourth, and also sees: its hand after each action, with an error of 5 mm along each
+axis (standard deviation), by which its plant corrects the encoders (`mobee.vision.calibration.self_calibration`).  During evaluations it
+does not see the hand, because they measure what it knew before.  It also sees an object that appears or has moved, with an error of 1 cm
+along each axis, and of 5 mm in the radius of a ball.  Then it first makes 300 problem-tries on a simulated robot in the world as it is seen
+(`ReachAgent.practise`); they do not count among the 60.  The simulator is that of the robot itself, so that only the errors of the object
+and the noise differ: this shows what perception is worth, not what a wrong model of the robot costs.  All learners are judged by the true
+place of the hand.
 """
 
 from __future__ import annotations
@@ -84,7 +87,7 @@ class FixedRate:
         self._outcomes = 0
 
     def add(self, learned: float, unknown: float) -> int | None:
-        """Count an outcome; returns 100 at every hundredth outcome, else None.
+        """Count an outcome; returns 100, the number of outcomes since the last change, at every hundredth outcome, else None.
 
         `learned`, `unknown`: probabilities, which are not used.  As in `mobee.learning.reaching.changes.Detector.add`.
         """
@@ -96,9 +99,10 @@ class LikelihoodRatio:
     """A detector by the generalised likelihood ratio of two windows with different shares of contradicting outcomes.
 
     In a window, a constant share of the outcomes contradicts what was learned: these have the probability `unknown`, the others `learned`
-    (the arguments of `add`).  The outcomes since the last change are divided into two windows where their likelihood is largest.  A change
-    is reported if the logarithm of this likelihood exceeds that of a single window by more than two terms: the Bayesian information
-    criterion of two further parameters, and the logarithm of the largest probability of a change that `RunLength` considers.
+    (the arguments of `add`).  The n outcomes since the last change are divided into two windows at the place where their likelihood is
+    largest.  A change is reported if the logarithm of this likelihood exceeds that of a single window by more than log n - log h: log n is
+    the penalty of the Bayesian information criterion for two further parameters, and h the largest probability of a change per outcome that
+    `RunLength` considers.
     """
 
     def __init__(self) -> None:
@@ -137,8 +141,8 @@ OURS, WITHOUT = "run length, sees", "no detector"
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
     """Return the settings of the runs: one for each change; the change "ball" has one for each of the 20 balls.
 
-    With --quick there is one ball, and a quarter of the tries.  The world that does not change has ten times as many seeds: its
-    claim is an equality to 1 %, and single scores have a standard deviation of 1.8 %.
+    With --quick there is one ball, and a quarter of the tries.  The world that does not change has ten times as many seeds, because its
+    claim is an equality to 1 %, while single scores have a standard deviation of 1.8 %.
     """
     quick = arguments.quick
     share, name = (4, "quick-") if quick else (1, "")
@@ -212,10 +216,10 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
     Returns for the D learners, after each of L numbers of problem-tries (attempts to reach one target) since the change, the means over the
     evaluations: `score` (D, L), sum of the rewards; `failures` (D, L), failed transitions; `without` (D, L), targets without a reach.
-    `false` (D,): number of changes detected before the world changed.  `detected` (D,): problem-tries after the change until one was
-    detected, 0 if it was seen, inf if neither.  `oracle`: score of the oracle.  `settings`: "change" and "ball", as in `plant_of`; "tries",
-    the number before the change; "checkpoints", the L numbers; "practice", number of tries in a simulation of the changed world.  `seed`:
-    of learners and plants.
+    `false` (D,): number of changes detected before the world changed.  `detected` (D,): problem-tries from the change until the learner
+    detected a change; 0 if it saw the change at once, inf if it never detected one.  `oracle`: score of the oracle.  `settings`: "change"
+    and "ball", as in `plant_of`; "tries", the number before the change; "checkpoints", the L numbers; "practice", number of tries in a
+    simulation of the changed world.  `seed`: of learners and plants.
     """
     found = [_learned(*learner, settings, seed) for learner in LEARNERS.values()]
     names = ("score", "failures", "without", "false", "detected")

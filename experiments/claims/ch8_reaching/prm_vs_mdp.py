@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compare roadmap planners (PRM) with the learned MDP planner on the same noisy robot, of which the roadmaps have a wrong model.
 
-Claim: "a plan first, act later approach, such as PRM planning, will never work well on robots such as the iCub", and the roadmap's
-"simple graph is insufficient"; an MDP is needed.  Source: paper 2.3, 3.1 (which announce this comparison); thesis 4.2.
+Claim: "a plan first, act later approach, such as PRM planning, will never work well on robots such as the iCub", and the roadmap's "simple
+graph is insufficient"; an MDP is needed.  Source: paper 2.3, 3.1 (which announce this comparison); thesis 4.2.
 Published: no numbers.  Run time: four minutes on 2 cores.
 
-The left arm of the published robot among four balls; 60 queries from rest to a cell of the rank 3 lattice, at most 120 s each.  Half of the
-queries are hard: a straight motion does not reach the goal.  The roadmaps' model of the robot lacks the shoulder's cables ("no cables"), or
-its balls are wrong by 1 cm and its joints by 3 degrees ("miscalibrated"), or both; "gross" has three times these errors.  The MDP has no
-such model: it learns by curiosity before the queries, or from the queries alone.  A roadmap is planned once, or repaired after a failed
-motion for the present query ("repairs") or for all later queries too ("remembers").  A roadmap does not work well if it succeeds in less
-than 95 % of the hard queries and less often than the MDP.  The seeds draw balls, noise and queries; all runs share the lattice's graph.
+The left arm of the published robot moves among four balls.  Each of 60 queries begins at rest, ends in the Voronoi cell of a state of the
+rank 3 lattice, and lasts at most 120 s.  Half of the queries are hard: a straight motion does not reach the goal.  The model that the
+roadmaps use lacks the constraints of the shoulder's cables ("no cables"), or its balls are wrong by 1 cm and its joints by 3 degrees
+("miscalibrated"), or both; "gross" lacks the cables and has three times these errors.  The MDP has no such model: it learns by curiosity
+before the queries, or from the queries alone.  A roadmap is planned once, or repaired after a failed motion for the present query
+("repairs") or for all later queries too ("remembers").  A roadmap does not work well if it succeeds in less than 95 % of the hard queries
+and less often than the MDP.  The seeds draw balls, noise and queries; all runs share the lattice's graph.
 """
 
 from __future__ import annotations
@@ -85,8 +86,8 @@ SHOWN = "both"  # the roadmaps' model in the curves
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
     """Return the settings of the runs: straight motions, the MDP after 0, 1000 and 4000 transitions, and roadmaps with each model.
 
-    The models of the roadmaps' planners have no errors, or one of four kinds of errors, as in `believed`.  With --quick there are 20
-    queries instead of 60.
+    The models that the roadmaps use have no errors, or one of four kinds of errors, as in `believed`.  With --quick there are 20 queries
+    instead of 60.
     """
     shared = {"queries": 20 if arguments.quick else QUERIES}
     learned = [Condition(f"mdp-{n}", {**shared, "learned": n}, 1.0 + n / 1000) for n in LEARNED]
@@ -98,9 +99,10 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Let the planners of one kind (straight, MDP or roadmaps) answer all queries.
 
     Returns `hard` (Q,), whether a straight motion had failed in the query; and arrays with keys "planner|measure".  The measures are
-    "success", "seconds" (plant time), "actions" and "repairs", each (Q,), and "cost", hours of plant time or thousands of poses checked
-    before the first query.  `settings`: "queries", their number; for the MDP also "learned", the number of transitions; for roadmaps
-    "belief", the kind of errors in their model, as in `believed`.  `seed`: of scene and planners.
+    "success", "seconds" (plant time), "actions" and "repairs", each (Q,), and "cost", a number: for the MDP the hours of plant time before
+    the first query, for roadmaps the thousands of poses that were checked before it.  `settings`: "queries", their number; for the MDP also
+    "learned", the number of transitions; for roadmaps "belief", the kind of errors in their model, as in `believed`.  `seed`: of scene and
+    planners.
     """
     scene, lattice = make_scene(seed, settings["queries"]), space()
     values: dict[str, Any] = {"hard": scene.is_hard}
@@ -138,7 +140,8 @@ class Scene:
     """The true world, the errors of the planners' model, and Q queries from rest to the cell of a lattice state.
 
     `balls`: (B, 3) m, true positions.  `shifts`: (B, 3) m, believed minus true positions.  `turns`: (4,) rad, believed minus true joint
-    angles.  `starts`: (Q, 4) rad.  `goals`: (Q,) goal states.  `is_hard`: (Q,), whether the straight motion failed when it was tried.
+    angles.  `starts`: (Q, 4) rad, start poses of the arm.  `goals`: (Q,) goal states.  `is_hard`: (Q,), whether the straight motion failed
+    when it was tried.
     """
 
     balls: Array
@@ -294,8 +297,9 @@ class Row:
     """The results of one planner with one belief (the errors of its model), over the seeds.
 
     `numbers`: means over the queries, (seeds,), under "success", "hard" (success in hard queries), "seconds" (plant time; 120 s for queries
-    that failed), "actions" and "repairs".  `cost`: hours of plant time, or thousands of poses checked, before the first query.  `blocks`:
-    plant time per query in each block of 20 queries, (seeds,); the last blocks have fewer seeds if a scene has fewer queries.
+    that failed), "actions" and "repairs".  `cost`: hours of plant time (MDP), or thousands of checked poses (roadmaps), before the first
+    query.  `blocks`: for each block of 20 consecutive queries, the plant time per query, (seeds,); the last blocks have fewer seeds if a
+    scene has fewer queries.
     """
 
     numbers: dict[str, Array]

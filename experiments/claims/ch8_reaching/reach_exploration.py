@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compare three exploration strategies of an agent that learns to reach for the 27 targets of the thesis.
 
-Claim: after about 800 problem-tries, intrinsically motivated exploration yields higher scores than random or greedy optimistic
-exploration, and its score rises steadily, although it is the lowest after 100.  Its runs agree on a few states to reach from; the runs
-of the other strategies do not.  The random explorer receives the most negative rewards and takes twice the robot's time.
+Claim: after about 800 problem-tries, intrinsically motivated exploration yields higher scores than random or greedy optimistic exploration,
+and its score rises steadily, although it is the lowest after 100.  Its runs agree on a few states from which they reach; the runs of the
+other strategies do not.  The random explorer receives the most negative rewards and takes twice the robot's time.
 Source: thesis 8.4, figs. 8.2 to 8.8; 3 strategies x 5 runs x 6400 problem-tries, evaluated 5 times after 100, 200, ... 6400.
 Published: 207, 109 and 113 hours for 5 runs of random, greedy and intrinsic exploration; otherwise figures only.
 Run time: 30 minutes on 2 cores; with 5 seeds, as published, 12.
 
 The robot is the right arm with four joints under the published control law.  It has 81 states and 432 actions to equidistant neighbours.
-For every seed, a curious agent first learns the outcomes of these actions in 3000 transitions without a target.  Predictors, strategies
-and negative rewards are as published, read as docs/reaching.md explains.  The thesis does not name the unit of distances in the equations:
-all strategies run with 1 cm, and with 3 cm and 10 cm for the first 10 seeds (--scales).  A score is the sum of
-the rewards of the 27 targets in one evaluation.  experiments/kit/reaching/README.md lists the targets and which of them inverse
-kinematics can reach.
+For every seed, a curious agent first learns the outcomes of these actions in 3000 transitions without a target.  Predictors, strategies and
+negative rewards are as published; docs/reaching.md explains how the texts are interpreted.  The thesis does not name the unit of distances
+in the equations: all strategies run with 1 cm, and with 3 cm and 10 cm for the first 10 seeds (--scales).  A score is the sum of the
+rewards of the 27 targets in one evaluation.  experiments/kit/reaching/README.md lists the targets and which of them inverse kinematics can
+reach.
 """
 
 from __future__ import annotations
@@ -102,9 +102,9 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Learn the outcomes of actions, and then to reach for the 27 targets with one strategy.
 
-    Returns arrays by name.  For the T attempts to reach one target (problem-tries): `problem`, `reach_state`, `reward`, `actions`,
-    `duration` [s], each (T,); `failures` (S, A), failures of each transition.  For L evaluations of R repetitions: `rewards_grid` and
-    `states_grid` (L, R, 27), and `blocked_grid` (L,), failed transitions.  The names are those of
+    Returns arrays by name.  For the T attempts to reach one target (problem-tries): `problem`, the number of the target, `reach_state`,
+    `reward`, `actions` and `duration` [s], each (T,); `failures` (S, A), number of failures of each transition.  For L evaluations of R
+    repetitions: `rewards_grid` and `states_grid` (L, R, 27), and `blocked_grid` (L,), failed transitions.  The names are those of
     `experiments.kit.reaching.learning.learn`.  `settings`: "strategy", its name; "law", a key of the dict that `laws` returns; "scale",
     unit of distances [m]; "checkpoints", numbers of tries before the evaluations.  `seed`: of agent and plant.
     """

@@ -5,7 +5,8 @@
 
 The robot is the iCub at its table under the default law, simulated offline; its right arm reaches.  RUN is the file that a `ReachStore` of
 a learner wrote; if it does not exist, a new learner makes 3000 curious transitions and 800 problem-tries on the 27 targets of the thesis.
-Then it reaches 60 times for random targets from random states; the clearest examples are drawn: from above, far, around the target.
+Then it reaches 60 times for random targets from random states.  The clearest example of each of three kinds is drawn: a reach from above, a
+far one, and one around the target.
 """
 
 from __future__ import annotations
@@ -48,7 +49,8 @@ MIN_LENGTH = 0.15  # m, of a path that is shown
 class Episode:
     """A reach that succeeded.
 
-    `target`: what was reached.  `done`: the try, with its actions before the reach.  `motion`: of the robot until the hand arrived.
+    `target`: the target that was reached.  `done`: the whole try, with the actions before the reach.  `motion`: motion of the robot until
+    the hand arrived.
     """
 
     target: ReachTarget
@@ -104,9 +106,9 @@ def episodes(agent: ReachAgent, plant: OfflinePlant, count: int, seed: int) -> l
 def selected(paths: Sequence[Array]) -> dict[str, int]:
     """Return a dict from the kind of path to the index of its clearest example among paths (T, 3) m of the hand.
 
-    The kinds are "From above", "Far" and "Around the target".  The clearest example has the steepest descent at its end, the largest
-    distance between its ends, or the largest detour.  No path is chosen for two kinds, and none shorter than 15 cm, so that kinds may be
-    absent.
+    The kinds are "From above", "Far" and "Around the target".  Their clearest examples have, in this order, the steepest descent at the
+    end, the largest distance between start and end, and the largest detour.  No path is chosen for two kinds, and none shorter than 15 cm,
+    so that kinds may be absent.
     """
     left = [number for number, path in enumerate(paths) if _length(path) >= MIN_LENGTH]
     chosen: dict[str, int] = {}

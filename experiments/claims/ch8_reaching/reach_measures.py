@@ -42,7 +42,7 @@ class Runs:
         return np.array([one["rewards_grid"][at].sum(axis=-1).mean() for one in self.values])
 
     def chosen(self, checkpoint: int) -> Array:
-        """Return how often the evaluations of each run reached from each of the S states, as shares, (N, S) (figs. 8.4 to 8.6).
+        """Return the share of each run's reaches in the evaluations that started in each of the S states, (N, S) (figs. 8.4 to 8.6).
 
         `checkpoint`: number of problem-tries (attempts to reach one target) before the evaluation, one of `checkpoints`.
         """
@@ -70,7 +70,7 @@ class Runs:
         return np.array([np.searchsorted(np.cumsum(one), 0.5) + 1.0 for one in ordered])
 
     def height(self, checkpoint: int) -> Array:
-        """Return the mean height of the palm in the states that were reached from, minus that in all states, (N,) m.
+        """Return the mean height of the palm in the states in which the reaches of a run started, minus that in all states, (N,) m.
 
         `checkpoint`: number of problem-tries (attempts to reach one target) before the evaluation, one of `checkpoints`.
         """

@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compare predictors of the reward of a reach with an oracle, by the score of the agents that use them.
+"""Compare predictors of the reward of a reach with an oracle (an agent that knows the true rewards), by the scores of the agents.
 
-Claim: a predictor that generalises over poses and targets reaches at least .80 of an oracle's score after 200 problem-tries, .90 after
-400 and .97 after 1600, and .80 after 800 on targets that were never tried; the published predictor reaches much less.
+Claim: a predictor that generalises over poses and targets reaches at least .80 of an oracle's score after 200 problem-tries, .90 after 400
+and .97 after 1600, and .80 after 800 on targets that were never tried; the published predictor reaches much less.
 Source: the numbers are aims of this reproduction; thesis 8.5 and 9.4.4 propose "a more powerful function approximator".
 Published: no numbers.
 Run time: 20 minutes on 2 cores.
 
 The arm, the targets and the evaluations are those of the experiment reach-exploration.  All learners have the same seeds, problems and
 transition models.
-The oracle plans as the learners do, but knows the mean reward of every reach and which transitions a target blocks; both are measured by
-5 tries of each on the plant (truth.npz in the run's folder).  Scores are divided by the oracle's mean score over all seeds, so that a
-fraction can exceed 1 by chance.  The targets that are never tried lie in the middle of the grid's eight cells.  "spread", "local" and
-"alike" in a learner's name say how it remembers failed transitions (mobee/learning/reaching/failures.py).
+The oracle plans as the learners do, but knows the mean reward of every reach and which transitions a target blocks.  Both are measured on
+the plant by 5 tries of each reach and transition (truth.npz in the run's folder).  Scores are divided by the oracle's mean score over all
+seeds, so that a fraction can exceed 1 by chance.  The targets that are never tried lie in the middles of the eight cells of the grid of 27
+targets.  "spread", "local" and "alike" in a learner's name say how it remembers failed transitions (mobee/learning/reaching/failures.py).
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ def cells(arguments: argparse.Namespace) -> list[Cell]:
 
 
 def measure_truth(cell: Cell) -> dict[str, Any]:
-    """Measure the remaining errors of reaches from all states for the target of a cell, and the transitions that it blocks.
+    """Measure the remaining errors of reaches from all states for the target of a cell, and which transitions this target blocks.
 
     Returns `missing` (S, n) m, remaining errors of n tries to reach from each state, NaN for tries that were not made; and `made` and
     `failed` (S, A), the number of tries of each transition, and of those that did not end in its goal.
@@ -147,7 +147,7 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 def summary(values: dict[str, Any]) -> dict[str, Any]:
     """Reduce the values of a cell for the raw record: only rewards are kept, added up over the targets of an evaluation.
 
-    They are (L, R, 1), for L evaluations of R repetitions.  The values of a cell that measures the truth are not changed.
+    The sums are (L, R, 1), for L evaluations of R repetitions.  The values of a cell that measures the truth are not changed.
     """
     rewards = {name: value for name, value in values.items() if name.startswith("rewards_")}
     return {name: value.sum(axis=-1, keepdims=True) for name, value in rewards.items()} or values
@@ -165,9 +165,9 @@ def oracle_scores(found: Found, name: str) -> Array:
 
 
 def fractions(found: Found) -> Fractions:
-    """Return the scores of each learner, divided by the mean score of the oracle, (seeds, checkpoints).
+    """Return a dict from (learner, set of targets) to the scores divided by the oracle's mean score, (seeds, checkpoints).
 
-    The keys are (learner, set of targets).  Empty without finished cells of the oracle.
+    The sets are "grid" and "between".  The dict is empty without finished cells of the oracle.
     """
     curves: Fractions = {}
     for name in (GRID, BETWEEN):

@@ -1,23 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compare a reach learner with a planner whose model is wrong, and which replans after every change, with and without memory.
+"""Compare a reach learner with planners whose model is wrong, and which plan again after every change, with and without memory.
 
 Claim: where the model is wrong, learning from tries overtakes planning (thesis 9.3: one could plan the motions offline, but moving the
 target just a little may invalidate the plan).
-Source: thesis 5.3, 9.3; our own aims: equal success after 200 tries, 20 points more after 800.  Published: no numbers.
+Source: thesis 5.3, 9.3; our own aims: equal success after 200 tries, 20 percentage points more after 800.  Published: no numbers.
 Run time: ten minutes on 2 cores, for 10 seeds.
 
-The right arm of today's robot under the default law, and 27 targets that it can touch where no limit pushes: 12 of the thesis, the
-others drawn between them; those that the ball closes off are left out.  Every planner's model lacks the constraints of the shoulder's
-cables and a ball of 10 cm in the workspace, which only blocks motions; its target positions are wrong by 1 cm and its joints by 3 degrees.
-"planners": only the planners' model is wrong; "everyone": MoBeE's model has the same errors, so that the learner's reaches miss as the
-peer's plans do, and only the outcome shows it; "nothing": all models are right, for comparison.
+The right arm of today's robot, under the default law, has 27 targets that it can touch without a force of a joint limit: 12 of the thesis,
+and others drawn between them.  Targets that cannot be touched because of the ball are left out.  The planners' model lacks the constraints
+of the shoulder's cables, and a ball with a diameter of 10 cm in the workspace, which only blocks motions; its target positions are wrong by
+1 cm and its joints by 3 degrees.  There are three kinds of runs.  "planners": only the planners' model is wrong.  "everyone": MoBeE's model
+has the same errors of targets and joints, so that the learner's reaches miss as the planners' motions do, and only the outcome shows it.
+"nothing": all models are right, for comparison.
 
-The learner has learned the transitions of its lattice in 3000 curious transitions without target and ball.  Learner and peer make the same
-number of tries, each of the target least tried, from the arm's present pose.  The peer has inverse kinematics and RRT-Connect (OMPL) with
-the compiled validity test, and 20 actions per try where the learner has 10.  It remembers nothing ("none"), or where motions were blocked
-("blocked"), or also which poses missed the target ("missed").  A try fails when its actions are used up.
-The seeds draw ball, errors, noise and first poses.  Seed 0 was used while scene and peer were developed: the reported runs begin with
---seed 1.
+The learner has learned the outcomes of transitions in 3000 curious transitions without target and ball.  Learner and planner make the same
+number of tries; each try is for the target with the fewest tries so far, from the arm's present pose.  The planner uses inverse kinematics
+and RRT-Connect (OMPL) with the compiled validity test; it has 20 actions per try, the learner 10.  It remembers nothing ("none"), or where
+motions were blocked ("blocked"), or also which poses missed the target ("missed").  A try fails when its actions are used up.
+The seeds draw ball, errors, noise and first poses.  Seed 0 was used while scene and planner were developed; therefore the reported runs
+begin with --seed 1.
 """
 
 from __future__ import annotations
@@ -94,9 +95,9 @@ TITLES = {
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return the settings of the runs: the learner and each planner, if nobody's, the planners' or everyone's model is wrong.
+    """Return the settings of the runs: learner and planners with each kind of wrong model, "planners", "everyone" and "nothing".
 
-    With --quick there are at most 100 tries.
+    With "nothing" only the planner without memory is run.  With --quick there are at most 100 tries.
     """
     tries = list(TRIES[:4] if arguments.quick else TRIES)
     return [
@@ -109,10 +110,10 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Let one contestant learn, and evaluate it after each number of tries in the setting `tries`.
 
-    Returns `rows`, a dict for each evaluation: `fates`, `seconds` and `actions` as in `Score`, and `hours`, the plant time so far; and the
-    number of `targets`.  For a planner also `planning`, the processor time of each try [s], and `remembered`, the number of poses in its
-    memory.  `settings`: "contestant": "learner", or the planner's kind of memory; "wrong", one of WRONG; "tries", the numbers.  `seed`: of
-    scene and contestant.
+    Returns `rows`, a list with a dict for each evaluation: `fates`, `seconds` and `actions` as in `Score`, and `hours`, the plant time so
+    far [h]; and `targets`, their number.  For a planner also `planning`, the processor time of each try [s], and `remembered`, the number
+    of poses in its memory.  `settings`: "contestant": "learner", or the planner's kind of memory; "wrong", one of WRONG; "tries", the
+    numbers.  `seed`: of scene and contestant.
     """
     contestant = settings["contestant"]
     scene = make_scene(seed, settings["wrong"])
@@ -156,7 +157,11 @@ class Scene:
         return JudgedPlant(arm_plant(seed, _world(self.ball) if ball else None), errors, [UNSEEN])
 
     def belief(self) -> PeerBelief:
-        """Return the planners' model of arm and workspace; unless nothing is wrong, it lacks ball and cable constraints."""
+        """Return the planners' model of arm and workspace.
+
+        Unless `wrong` is "nothing", it lacks the ball and the cable constraints.  If `wrong` is "planners", its joints have the errors
+        `turns`.
+        """
         if self.wrong == "nothing":
             return arm_belief(_world(self.ball))
         return arm_belief(cables=False, turns=self.turns if self.wrong == "planners" else None)
@@ -218,8 +223,8 @@ def _ball(rng: np.random.Generator, targets: Array) -> Array:
 class Score:
     """The result of an evaluation.
 
-    `fates`: (4,), shares of tries that reached the target, missed it, used up their actions, and had no plan.  `seconds`: mean plant time
-    of a try.  `actions`: mean number of actions of a try.
+    `fates`: (4,), shares of tries by their end, in this order: target reached, target missed, all actions used up, no plan.  `seconds`:
+    mean plant time of a try.  `actions`: mean number of actions of a try.
     """
 
     fates: Array
@@ -370,7 +375,8 @@ def _row(done: Cells, contestant: str, wrong: str) -> dict[str, Any]:
 def verdict(leads: Mapping[str, Array], least: float) -> bool | None:
     """Return whether the learner's lead in success over each planner is at least `least`, by the intervals.
 
-    `leads`: (seeds,) for each planner.  False if the lead over one planner is below `least`, None if that is undecided.
+    `leads`: dict from a planner to the learner's share of successes minus that of the planner, (seeds,).  False if the lead over some
+    planner is below `least`, None if the intervals leave this open.
     """
     return all_hold(decides(interval(lead), least=least) for lead in leads.values())
 
@@ -388,7 +394,8 @@ def success(done: Cells, contestant: str, wrong: str) -> tuple[list[int], Array]
 def crossover(tries: list[int], learner: Array, peer: Array) -> Array:
     """Return, for each seed, the number of tries from which the learner's success is never again below the planner's, (seeds,).
 
-    `tries`: numbers of tries at the points.  `learner`, `peer`: shares of successes (seeds, points).  inf if the learner ends below.
+    `tries`: numbers of tries at the points.  `learner`, `peer`: shares of successes of learner and planner, (seeds, points).  inf if the
+    learner's last share is below the planner's.
     """
     ahead = learner >= peer
     for_good = np.flip(np.cumprod(np.flip(ahead, 1), axis=1), 1).astype(bool)

@@ -1,25 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compare the learned reacher with a planner (inverse kinematics and RRT-Connect) that knows the robot and the world.
 
-Claim: the learned reacher is no worse than planning with a perfect model, also under encoder noise and for a moving target; and single
-query planning is too slow to be used online: 10 s for both arms around a table's edge to a cup, and 125 s of smoothing.
+Claim: the learned reacher is no worse than planning with a perfect model, also under encoder noise and for a moving target.  Single-query
+planning is too slow to be used online: it takes 10 s for a path of both arms around a table's edge to a cup, and 125 s to smooth this path.
 Source: thesis 1.5, 9.3.  Published: BT-RRT's 10 s and 125 s (Perez et al. 2011).  Run time: three minutes on 2 cores.
 
-One arm: the right arm of today's robot under the default law; targets (where no joint limit pushes), first poses and seeds are the same
-for both.  The learner has made 3000 curious transitions and 800 tries before, and learns nothing here.  The planner peer
-(experiments/kit/reaching/planner_peer.py) knows the robot, its cables and the target's position, replans after every change, and is
-executed through MoBeE.  "noise": encoder noise of 0.5 degrees, five times the usual; "moving": the target moves back and forth by 5 to
-12 cm at 3 cm/s without a stop.  Success: the palm within 2 cm of the surface; the learner may reach three times, the peer has 20 actions.
-Plant time stands still during planning, which is measured in processor time.
+One arm: the right arm of today's robot under the default law.  Targets (which the arm can touch without a force of a joint limit), first
+poses and seeds are the same for learner and planner.  The learner has made 3000 curious transitions and 800 tries before, and learns
+nothing here.  The planner (experiments/kit/reaching/planner_peer.py) knows the robot, its cables and the target's position, and plans again
+after every change; MoBeE executes its motions.  "noise": encoder noise of 0.5 degrees, five times the usual; "moving": the target moves
+back and forth by 5 to 12 cm at 3 cm/s without a stop.  Success: the palm is within 2 cm of the target's surface; the learner may reach
+three times, the planner has 20 actions.  Plant time stands still during planning, which is measured in processor time.
 
-A moving target has another position after every motion of the peer, so that all paths except straight ones are replanned at each corner.
-The last motion takes a second or more, and goes to the position that the target had when this motion began.  The learner's reach follows
-the target.  Neither of them predicts the target's motion.
+A moving target has another position after every motion of the planner, so that all paths except straight ones are planned again at each
+corner.  The last motion takes a second or more, and goes to the position that the target had when this motion began.  The learner's reach
+follows the target.  Neither of them predicts the target's motion.
 
 Two arms (twelve joints, thesis 1.5): no drawing of this problem was published.  Here both hands begin beside the table, below its top or
-just above it, and end on both sides of a cup; poses are drawn anew for each query.  So the times compare orders of magnitude only, and
-today's processor with that of 2011.
-Seed 0 was used while the peer was developed: the reported runs begin with --seed 1.
+just above it, and end on both sides of a cup; poses are drawn anew for each query.  So the comparison of times shows orders of magnitude
+only; it also compares today's processor with that of 2011.  Seed 0 was used while the planner was developed; therefore the reported runs
+begin with --seed 1.
 """
 
 from __future__ import annotations
@@ -92,8 +92,9 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
     For the cases, returns arrays (cases,) with keys "scene|contestant|measure"; the measures are "success", "missing" [m], "seconds" (plant
     time) and "thinking" (processor time for plans, s).  For both arms, returns arrays (queries,): "found", "seconds", "smoothing",
-    "corners" and "missing", as in `PlannedQuery`.  `settings`: "scene", "two arms" for paths of both arms, or "cases"; for both arms
-    "queries", for the cases "cases", "transitions" and "tries" of the training: numbers.  `seed`: of learner, cases and planner.
+    "corners" and "missing", as in `PlannedQuery`.  `settings`: "scene", "two arms" for paths of both arms, or "cases"; for both arms the
+    number of "queries"; for the cases the numbers of "cases", and of "transitions" and "tries" of the training.  `seed`: of learner, cases
+    and planner.
     """
     if settings["scene"] == "two arms":
         queries = [plan_both_arms(1000 * seed + number) for number in range(settings["queries"])]
@@ -135,8 +136,8 @@ class PlannedQuery:
     """The result of a query of both arms.
 
     `found`: whether there is a path.  `seconds`, `smoothing`: processor time to find the path, and to shorten it.  `corners`: number of
-    poses of the path.  `missing`: distance of a palm from its planned position at the end of the executed path, of the two palms the larger
-    one, m; inf without a path.
+    poses of the path.  `missing`: distance of a palm from its planned position at the end of the executed path, the larger one of the two
+    palms [m]; inf without a path.
     """
 
     found: bool
@@ -234,8 +235,8 @@ def findings(found: Cells) -> dict[str, Any]:
     """Return the results of the sweep.
 
     Keys: "claims", a list with the judged claims, as dicts (`Claim.record`); "cases", a list with a row for each scene and contestant, as
-    text: success, robot time [s], and planning per try [ms]; "both arms", a dict from each measure in ARM_MEASURES but the first to text,
-    or None if it was not measured; and "distance that counts as success [m]".
+    text: success, robot time [s], and planning per try [ms]; "both arms", a dict from each measure in ARM_MEASURES except the first to its
+    estimate as text, or None if it was not measured; and "distance that counts as success [m]".
     """
     cases, arms = _of(found, "cases"), _of(found, "two arms")
     rows = [

@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Replan around a cup that was put on the table after the roadmap was built, in roadmaps of growing density.
 
-Claim: infeasible edges are found "when the back of the hand bumps into the object"; the map is adapted and the path replanned, which
-"works well in practice".  But in a dense map "finding a path around a novel obstacle takes a very long time, because any obstacle
-invalidates many, many edges".  Source: thesis 4.3.3, 4.4, figs. 4.8, 4.9.  Published: 5000 vertices, k = 8; no numbers of bumps.
+Claim: infeasible edges are found "when the back of the hand bumps into the object"; the map is adapted and the path replanned, which "works
+well in practice".  But in a dense map "finding a path around a novel obstacle takes a very long time, because any obstacle invalidates
+many, many edges".  Source: thesis 4.3.3, 4.4, figs. 4.8, 4.9.  Published: 5000 vertices, k = 8; no numbers of bumps.
 Run time: 5 minutes on 2 cores.
 
 The roadmap is that of figure 4.8: torso and right arm, palm down 6 cm over the table, 8 nearest neighbours, no edge checked, built by least
 squares, with spacings from 4 cm to 8 mm, which give 170 to 4400 vertices.  A query goes from one vertex to another.  The robot sees
 nothing.  A cup, 10 cm high and 6 cm wide, stands beside the shortest path, where another path remains.  The robot follows the edges of its
-path; a bump is the first edge on which solids would touch, checked every millimetre; then the robot goes back to the beginning of that
-edge and replans.  "edge": the edge is removed (thesis 4.2).  "around" (ours): all edges that end within 3 cm of the end of that edge are
-removed as well, as long as a path remains.  The offline plant under the default law follows the path found after the bumps in the first
-query of each run.
+path.  A bump occurs on the first edge on which solids would touch, checked every millimetre; then the robot moves back to the beginning of
+that edge and plans again.  There are two modes.  "edge": the edge is removed (thesis 4.2).  "around" (ours): all edges with an end within 3
+cm of the end of that edge are removed as well, as long as a path remains.  In the first query of each run, the offline plant under the
+default law follows a path around the cup.
 """
 
 from __future__ import annotations
@@ -110,8 +110,8 @@ class Query:
 class Walk:
     """The result of a query.
 
-    `path`: vertices passed.  `arrived`: False if no path to the goal remained.  `bumps`: number of bumps.  `edges`: number of edges begun.
-    `seconds`: duration of the motion.
+    `path`: vertices that were passed, from start to end.  `arrived`: False if no path to the goal remained.  `bumps`: number of bumps.
+    `edges`: number of edges begun.  `seconds`: duration of the motion.
     """
 
     path: tuple[int, ...]
@@ -151,10 +151,10 @@ def draw_query(rng: np.random.Generator, roadmap: Roadmap) -> Query:
 
 
 def walked(roadmap: Roadmap, query: Query, mode: str) -> Walk:
-    """Follow the shortest path of the remaining edges; after a bump go back to the beginning of the edge, and replan.
+    """Follow the shortest path of the remaining edges; after a bump move back to the beginning of the edge, and plan again.
 
     `mode` "edge": a bump removes its edge (thesis 4.2).  "around": it also removes all edges with an end within 3 cm of the end of that
-    edge, except those that were passed; if no path remains, all edges without a bump of their own are used again.
+    edge, except edges that were passed; if no path remains, only the edges on which there was a bump stay removed.
     """
     removed: set[Edge] = set()
     bumped: set[Edge] = set()
@@ -232,8 +232,8 @@ def findings(found: Cells) -> dict[str, Any]:
 def numbers(runs: list[dict[str, Any]], mode: str, name: str) -> Array:
     """Return the mean of a measure over the queries of each run, (runs,).
 
-    `mode`: "edge": a bump removes its edge; "around": it removes all edges around its place.  `name`: "arrived", whether the goal was
-    reached; "bumps", number of bumps; "edges", number of edges begun; or "seconds", duration of the motion.
+    `mode`: "edge" (a bump removes its edge) or "around" (it also removes the edges near its place).  `name`: "arrived", whether the goal
+    was reached; "bumps", number of bumps; "edges", number of edges begun; or "seconds", duration of the motion.
     """
     return np.array([float(np.mean(values[f"{mode}|{name}"])) for values in runs])
 

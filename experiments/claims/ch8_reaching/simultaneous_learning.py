@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compare learning transitions and reaches at the same time with learning the transitions first.
 
-Claim: there is no reason that the transition model and the reaches cannot be learned simultaneously; where an action fails, contact with
-a workspace object decides whether the failure is a negative reward of the problem or an update of the model.
+Claim: there is no reason that the transition model and the reaches cannot be learned simultaneously; where an action fails, contact with a
+workspace object decides whether the failure is a negative reward of the problem or an update of the model.
 Source: thesis 9.4.1 (future work).  Published: no numbers.  Run time: five minutes on 2 cores.
 
-The right arm under the published law and the 27 targets, as in reach-exploration; one of the learners of reach-predictors (--learner).  All
-variants have the same total number of actions, with reaches and without evaluations.  "contact": transitions and reaches at the same time,
-failures attributed by contact.  "first-3000", "first-1000": so many curious transitions without targets, as in the thesis, then reaches;
-then the model does not change any more.  "model": at the same time, but every transition updates the model, as if there were no contact
-sensors.  "target": at the same time, but every transition that does not end in its goal is attributed to the target, so that only
-successes update the model.
+The right arm under the published law and the 27 targets are those of reach-exploration; the learner is one of reach-predictors (--learner).
+There are five variants.  All have the same total number of actions; reaches count, evaluations do not.  "contact": transitions and reaches
+are learned at the same time, and failures are attributed by contact.  "first-3000", "first-1000": first 3000 or 1000 curious transitions
+without targets, as in the thesis, and then reaches, during which the model does not change.  "model": at the same time, but every
+transition updates the model, as if there were no contact sensors.  "target": at the same time, but every transition that does not end in
+its goal is attributed to the target, so that only successes update the model.
 A score is the sum of the rewards of the 27 targets in one evaluation.  The error of a model is the mean L1 distance, 0 to 2, between its
-beliefs without imagined outcomes and the outcomes of random walks without targets.
+outcome probabilities (without the imagined outcomes of the prior) and the outcomes of random walks without targets.
 """
 
 from __future__ import annotations
@@ -155,8 +155,8 @@ class Runs:
     """The N runs of one variant, each evaluated after the L numbers of `actions` (L,).
 
     `scores`, `errors`: (N, L), score and mean L1 error of the transition model; NaN where there was no evaluation.  `observed`: (N, L), the
-    error over the transitions that the model has observed.  `tries`, `failed`: (N,), problem-tries (attempts to reach one target) and
-    failed transitions at the end.
+    mean error only over the transitions that the model has observed.  `tries`, `failed`: (N,), problem-tries (attempts to reach one target)
+    and failed transitions at the end.
     """
 
     actions: Ints
@@ -237,10 +237,10 @@ def actions_to(least: float, actions: Ints, scores: Array) -> Array:
 
 
 def no_more(ours: Array, theirs: Array) -> bool | None:
-    """Return whether our runs need at most as many actions as other runs of the same seeds.
+    """Return whether the runs of "contact" need at most as many actions as the runs of another variant with the same seeds.
 
-    `ours`, `theirs`: numbers of actions, (N,).  None if the interval of the differences leaves this open, or if a run never reached the
-    score, so that its number is inf.
+    `ours`, `theirs`: numbers of actions of these two groups of runs, (N,).  None if the interval of the differences leaves this open, or if
+    a run never reached the score, so that its number is inf.
     """
     if not np.isfinite([ours, theirs]).all():
         return None
@@ -248,10 +248,10 @@ def no_more(ours: Array, theirs: Array) -> bool | None:
 
 
 def level(ours: Array, theirs: Sequence[Array]) -> bool | None:
-    """Return whether our scores are at most 5 % below those of all other variants, by the intervals of the differences.
+    """Return whether the scores of "contact" are at most 5 % below those of all other variants, by the intervals of the differences.
 
-    `ours`: scores (N,) of N seeds.  `theirs`: scores (N,) of the same seeds, for each other variant.  False if ours are farther below one
-    of them, None if the intervals leave this open.
+    `ours`: scores (N,) of "contact" with N seeds.  `theirs`: scores (N,) with the same seeds, for each other variant.  False if ours are
+    farther below one of these, None if the intervals leave this open.
     """
     return all_hold(decides(interval(ours - other), least=-MARGIN * float(other.mean())) for other in theirs)
 

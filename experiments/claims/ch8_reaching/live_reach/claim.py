@@ -1,22 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compare the learned reacher with a planner on the live robot, in lockstep.
 
-Claim: trained offline and refined live, the learned reacher brings the palm to within 2 cm of the surface of at least 95 % of those of the
-thesis' 27 targets that can be reached, and of 90 % of new random targets, from random poses, without a solid contact deeper than 2 mm.
-Source: aim of this reproduction (thesis 8, 9.3).  Published: no number.  Run time: 10 to 25 minutes per start on 2 cores.
+Claim: a learned reacher that was trained offline and refined live brings the palm from random poses to within 2 cm of a target's surface:
+for at least 95 % of the reachable ones among the thesis' 27 targets, and for 90 % of new random targets, without a solid contact deeper
+than 2 mm.  Source: aim of this reproduction (thesis 8, 9.3).  Published: no number.  Run time: 10 to 25 minutes per start on 2 cores.
 
-The robot `icub` at its table under the default law, seven joints of its right arm, ticks of 20 ms; PyBullet (with --backend mujoco MuJoCo),
-with gravity.  In each start a learner (predictor gp, strategy ucb, failures alike) makes 3000 curious transitions and 800 tries of the 27
-targets on the offline plant with the identified motors, then 54 live tries.  Then, without learning, it tries each of the 27 and 50 new
-targets, each from another pose, with up to three reaches per try.  The planner peer (inverse kinematics and RRT-Connect, replanned after
-every change) has the same targets, poses and robot, and the true model; the target exerts no force while the planner moves, because the
-planner avoids it.  In addition there are 8 targets that move back and forth over 15 cm at 3 cm/s, and 8 targets at rest.  With these, a
-ball of 8 cm, in model and simulator, crosses the hand's path at the same speed.
+Seven joints of the right arm of the robot `icub` move at its table, under the default law, with ticks of 20 ms; PyBullet (with --backend
+mujoco: MuJoCo) simulates the robot, with gravity.  In each start (independent repetition) a learner (predictor gp, strategy ucb, failures
+alike) makes 3000 curious transitions and 800 tries of the 27 targets on the offline plant with the identified motors, then 54 live tries.
+Then, without learning, it tries each of the 27 and 50 new targets, each from another pose, with up to three reaches per try.  The planner
+("peer": inverse kinematics and RRT-Connect, with a new plan after every change) has the same targets, poses and robot, and the true model;
+the target exerts no force while the planner moves the arm, because the planner avoids it.  The learner also tries 8 targets that move back
+and forth over 15 cm at 3 cm/s, and 8 targets at rest for which a ball of 8 cm, in model and simulator, crosses the hand's path at the same
+speed.
 
 A target can be reached if inverse kinematics finds a pose within limits and cables, with the palm within 2 cm of the surface, in which the
-only contact of solids is that of hand and target (experiments/kit/reaching/README.md shows which).  All new targets can be reached.
-The judge uses the simulator's joints, not the encoders: the position of the palm when the force ended, or when the planner had finished.
-The learner makes the same tries on the offline plant too.
+only contact of solids is that of hand and target (experiments/kit/reaching/README.md shows which).  All new targets can be reached.  A try
+is judged by the simulator's joint positions, not the encoders: by the position of the palm when the force ended, or when the planner had
+finished.  The learner makes the same tries on the offline plant too.
 The time to the first motion is measured with ticks of 2 ms, from the tick of the request to the first tick with another command.
 """
 
@@ -84,7 +85,7 @@ PERFORM = "experiments.claims.ch8_reaching.live_reach.contestants:perform"
 
 @dataclass(frozen=True)
 class Sizes:
-    """The sizes of one start of the experiment, a learner with its tries.
+    """The numbers of tries in one start (independent repetition) of the experiment, in which one learner is trained and tested.
 
     `transitions`: curious transitions before the first target.  `tries`: offline tries of the 27 targets.  `live`: live tries while the
     learner still learns.  Targets that are tried without learning: `grid`, of the thesis; `fresh`, new ones; `moving`, new ones that move,
@@ -115,8 +116,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
     """Train the learners offline, refine them live, let learner and planner try to reach the targets, and return the results.
 
-    The tries are made in blocks, one for each launch; blocks that are already in the folder are not repeated.  Raises OmplMissing before
-    the first block.
+    The tries are made in blocks, one block for each launch of the live system or each job offline; blocks that are already in the folder
+    are not repeated.  Raises OmplMissing before the first block.
     """
     require_ompl()
     sizes, starts = QUICK if arguments.quick else Sizes(), 1 if arguments.quick else arguments.starts
@@ -258,8 +259,8 @@ def enough(tries: Sequence[Judged], least: float) -> bool | None:
 class Runs:
     """The finished blocks of tries, and which of the thesis' 27 targets can be reached, by number.
 
-    `touchable`: targets for which inverse kinematics finds a pose.  `left`: those of them that a reach of the offline plant can touch; from
-    the others the repulsive fields of the robot keep the palm away.
+    `touchable`: targets for which inverse kinematics finds a pose that touches them.  `left`: targets among these that a reach of the
+    offline plant can touch; from the others the robot's own repulsive fields keep the palm away.
     """
 
     blocks: Sequence[Block]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A block of tries on the live robot: by the learner (which may continue to learn), by the planner, or by the reach alone.
+"""Performs a block of tries on the live robot: by the learner (which may continue to learn), by the planner, or by the reach alone.
 
 `learned_offline` makes the learner's tries on the offline plant, for comparison.
 
@@ -108,9 +108,9 @@ def _tried(hand: Hand, problem: Problem, attempt: Callable[[Problem], Ended]) ->
 class Ended:
     """The result of one attempt to reach a target.
 
-    `ends`: ticks at which a reach ended, or the planner had finished.  `actions`: number of actions, reaches included.  `believed`:
-    distance from the target's surface at the end by the encoders, m.  `thinking`: processor time for plans, s.  `first`: ticks from the
-    request of the last reach to the first command that moves the arm; -1: not timed.
+    `ends`: ticks at which the reaches ended, or at which the planner had finished.  `actions`: number of actions, reaches included.
+    `believed`: distance of the palm from the target's surface at the end, by the encoders, m.  `thinking`: processor time for plans, s.
+    `first`: ticks from the request of the last reach to the first command that moves the arm; -1: not timed.
     """
 
     ends: list[int]
@@ -143,8 +143,8 @@ def contestant(hand: Hand, job: Job, mover: Mover | None) -> Callable[[Problem],
 def learned(hand: Hand, agent: ReachAgent, seed: int, mover: Mover | None, problem: Problem) -> Ended:
     """Let the learner attempt a problem: go to the state with the highest expected reward, and reach; returns the result.
 
-    After a miss it reaches from another state, up to three times in all.  The learner learns nothing.  `seed`: draws among equally good
-    actions.  `mover`: moves the target or the obstacle; None: nothing moves.
+    After a miss it reaches from another state, up to three times in all.  The learner learns nothing.  `seed`: of the draws among equally
+    good actions.  `mover`: moves the target or the obstacle; None: nothing moves.
     """
     where = _present(hand, mover, problem)
     course = Course(hand, agent, agent.predictor.mean, where, np.random.default_rng([seed, problem.number]), MIN_STATE_DISTANCE)

@@ -52,9 +52,9 @@ class Hand(BusPlant):
         return self._link.bus.k if motion is None else max(self._link.bus.k, motion.k)
 
     def watch_commands(self) -> None:
-        """Time the first motion of every following reach: afterwards `first` has its number of ticks.
+        """Time the first motion of every following reach: after a reach, `first` has the number of ticks until its first motion.
 
-        All commands are then read, which costs time in every tick.
+        From then on all commands are received, which costs time in every tick.
         """
         self._link.on_each(Commands, self._note_commands)
 

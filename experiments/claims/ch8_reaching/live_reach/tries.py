@@ -46,7 +46,8 @@ Kind = Literal["refine", "learner", "peer", "offline", "moving", "first motion"]
 class Job(Struct, frozen=True):
     """A block of tries in one launch of the live system.
 
-    `kind`: which contestant makes the tries.  `seed`: of the contestant.  `problems`: what is tried.
+    `kind`: which contestant makes the tries.  `seed`: of the contestant.  `problems`: targets that are tried, with the first postures of
+    the arm.
     """
 
     kind: Kind
@@ -62,11 +63,11 @@ class Tried(Struct, frozen=True):
     """The record of one try by the contestant; ticks are those of robot_sim.
 
     `kind`, `number`: of the problem.  `out`: tick at which the arm started towards its first posture.  `begin`: tick at which the target
-    was presented.  `ends`: ticks at which a reach ended, or the planner had finished.  `over`: tick at which the arm was at rest again.
-    `off`: error of the first posture, rad.  `actions`: number of actions, reaches included.  `believed`: distance from the target's surface
-    at the end by the encoders, m.  `thinking`: processor time for plans, s.  `why`: reason if the try ended without a reach.  `asked`: tick
-    of the last request.  `there`: position of a moving target at the last of the ends, m.  `first`: ticks from the last request to the
-    first command that moves the arm; -1: not timed.
+    was presented.  `ends`: ticks at which the reaches ended, or at which the planner had finished.  `over`: tick at which the arm was at
+    rest again.  `off`: largest error of a joint in the first posture, rad.  `actions`: number of actions, reaches included.  `believed`:
+    distance of the palm from the target's surface at the end, by the encoders, m.  `thinking`: processor time for plans, s.  `why`: reason
+    if the try ended without a reach.  `asked`: tick of the last request.  `there`: position of a moving target at the last of the ends, m.
+    `first`: ticks from the last request to the first command that moves the arm; -1: not timed.
     """
 
     kind: str
@@ -88,11 +89,12 @@ class Tried(Struct, frozen=True):
 class Judged(Struct, frozen=True):
     """The measures of one try, computed from the simulator's joint positions.
 
-    `kind`, `number`: of the problem.  `position`: of the target, m.  `off`: distance of the palm from the target's surface at the last end,
-    m.  `success`: within 2 cm.  `seconds`: robot time from the presentation of the target to the last end.  `actions`: number, with the
-    `reaches`.  `thinking`: processor time for plans, s.  `deep`: contacts of solids deeper than 2 mm.  `begun_off`: error of the first
-    posture, rad.  `why`: reason if the try was interrupted.  `first`, `first_motion`: ticks from the request to the first command that
-    moves, and to the first motion of a joint; -1: not timed.
+    `kind`, `number`: of the problem.  `position`: of the target, m.  `off`: distance of the palm from the target's surface at the end of
+    the try (of its last reach, or of the planner's last motion), m.  `success`: whether this is at most 2 cm.  `seconds`: robot time from
+    the presentation of the target to this end.  `actions`: number of actions, including the `reaches`.  `thinking`: processor time for
+    plans, s.  `deep`: contacts of solids deeper than 2 mm.  `begun_off`: largest error of a joint in the first posture, rad.  `why`: reason
+    if the try was interrupted.  `first`, `first_motion`: ticks from the request to the first command that moves, and to the first motion of
+    a joint; -1: not timed.
     """
 
     kind: str
