@@ -33,7 +33,7 @@ from mobee.arrays import Array
 from mobee.control import Reacher
 from mobee.simulation import OfflinePlant
 
-SOLID, CLAUSE = 2.0, 2.0  # mm, degrees: allowed with the default gains
+SOLID, CLAUSE, LIMIT = 2.0, 2.0, 0.0  # mm; degrees beyond constraints and limits: allowed with the default gains
 OSCILLATION, DEAD = 1.0, 0.3  # mm at rest; s without motion before the end: allowed
 
 LEVELS = (0.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0)  # N/kg at a marker; rad/s^2 at a motor; before the squash
@@ -200,22 +200,22 @@ def dead_time(hand: Array, dt: float) -> float:
     """Return the longest time [s] during which the hand had stopped before it was at its end position.
 
     `hand`: positions (T, 3) m.  `dt`: time between two of them [s].  Stopped: slower than 0.2 mm/s over 0.5 s, and more than 1 cm from the
-    end position.
+    end position; shorter stops count as none.
     """
     window = max(1, round(WINDOW / dt))  # single ticks are meaningless because of the motors' play
     speed = np.linalg.norm(hand[window:] - hand[:-window], axis=1) / (window * dt)
     stopped = (speed < SLOW) & (np.linalg.norm(hand[:-window] - hand[-1], axis=1) > NEAR)
     begins = np.flatnonzero(stopped & ~np.r_[False, stopped[:-1]])
     ends = np.flatnonzero(stopped & ~np.r_[stopped[1:], False])
-    return float((ends - begins + 1).max() * dt) if len(begins) else 0.0
+    return float(((ends - begins).max() + window) * dt) if len(begins) else 0.0
 
 
 def findings(found: Cells) -> dict[str, Any]:
     """Return the largest measurements as a dict from the gain set to a dict from the wall, or "drawn: " and the target, to numbers by name.
 
     The names are keys of the dicts of `press` and `draw_hand`.  "passed": whether with the default gains solids are at most 2 mm deep,
-    constraints violated by at most 2 degrees, oscillations at most 1 mm, and times without motion at most 0.3 s; None if the default gains
-    were not run.
+    constraints violated by at most 2 degrees, limits not exceeded, oscillations at most 1 mm, and times without motion at most 0.3 s; None
+    if the default gains were not run.
     """
     pressed, drawn = _grouped(found)
     table: dict[str, Any] = {gains: {} for gains in GAINS}
@@ -226,7 +226,7 @@ def findings(found: Cells) -> dict[str, Any]:
     for (gains, target), runs in drawn.items():
         table[gains][f"drawn: {target}"] = _largest(runs, "oscillation_mm", "dead_s", "from_target_mm")
     of_default = [row for (gains, _), rows in (pressed | drawn).items() if gains == "default" for row in rows]
-    allowed = {"solid_mm": SOLID, "clause_deg": CLAUSE, "oscillation_mm": OSCILLATION, "dead_s": DEAD}
+    allowed = {"solid_mm": SOLID, "clause_deg": CLAUSE, "limit_deg": LIMIT, "oscillation_mm": OSCILLATION, "dead_s": DEAD}
     passed = all(row[name] <= most for row in of_default for name, most in allowed.items() if name in row)
     rows = {gains: rows for gains, rows in table.items() if rows}
     return {"passed": passed if of_default else None, **rows}  # the claim is about the default gains
