@@ -47,7 +47,7 @@ class ReachTarget:
             raise UnknownName("aim", self.aim, AIMS)
         if self.faces and self.normal is not None:
             raise InvalidValue("target with a normal that also faces it: give a direction of the marker's normal, or faces=True, not both")
-        object.__setattr__(self, "position", where)
+        object.__setattr__(self, "position", where + 0.0)  # -0 and 0 are one position, also where its bytes are the key
         if self.normal is not None:
             normal = _triple(self.normal, "normal")
             length = float(np.linalg.norm(normal))
@@ -95,7 +95,8 @@ class ReachPlant(Plant, Protocol):
         """Pull the named marker by a force to the presented target until the part has settled or a time limit is over (thesis 8.2).
 
         Meanwhile the attractor stays at the target of the part's last action; when the force has ended, it pulls the part back.  `stay`:
-        True: the attractor moves to the pose in which the force ended, so that the part stays there; `after` is then the outcome there.
+        True: the attractor moves to the pose in which the force ended, so that the part stays there. There is no second phase then, and the
+        field `after` of the result is the outcome of the pull.
         Raises InvalidValue if no target is presented or the part does not move the marker; ActionInterrupted on a hold (a safe stop), a
         fault or a restart of the robot.
         """

@@ -2,8 +2,8 @@
 """Torso assist: moves the base of an arm so that the target is at a place that the arm reaches well (thesis 9.4.2).
 
 The worth of a place says how well the arm reaches it with its base link at home: it is the reward that a reach learner predicts, trained
-with the torso at home, or the manipulability of the arm. If the base moves, a target counts as the place that has the same position
-relative to the base at home.
+with the torso at home, or the manipulability of the arm. For another posture of the base, the position of the target relative to the base
+is computed; its worth is that of the place with the same position relative to the base at home.
 """
 
 from __future__ import annotations
@@ -78,8 +78,9 @@ class Assist:
     def posture(self, q: Array, target: Array) -> Assistance:
         """Return the best posture of the part for a target (3,) m, root frame; all other motors stay as in the posture q (n,) rad.
 
-        The score of a posture is the worth of the target for the arm (at most 1), minus 0.1 per rad^2 of motion. The part stays at its
-        present posture if no posture without contacts of solids has a score that is better by more than 0.05.
+        The score of a posture is the worth of the target for the arm (at most 1), minus 0.1 per rad^2 of motion. The result is the posture
+        with the highest score among those without contacts of solids whose score is more than 0.05 above that of the present posture; if
+        there is none, the present posture.
         """
         span = self.part.slice
         postures = np.concatenate([q[None, span], self._postures])
@@ -97,9 +98,14 @@ class Assist:
 
 
 def base_link(robot: Robot, arm: str) -> int:
-    """Return the index of the parent link of the first joint of the part `arm`; raise UnknownName if there is no such part."""
+    """Return the index of the parent link of the first joint of the part `arm`.
+
+    Raises UnknownName if there is no such part, InvalidValue if it moves no joint.
+    """
     span = robot.part(arm).slice
     driven = (robot.coupling[0][:, span] != 0.0).any(axis=1)
+    if not driven.any():
+        raise InvalidValue(f"{arm} of {robot.name!r} moves no joint: give a part with motors that do")
     return robot.joints[int(np.flatnonzero(driven)[0])].parent
 
 

@@ -110,9 +110,10 @@ LinkNames = tuple[str, str]
 class TouchingPair:
     """Two links whose solids touch.
 
-    `first`, `second`: names of the links; for a URDF, of its own links, before links of fixed joints are merged. `reason`: "Always": they
-    touch in all random poses; "Default": they touch at home (the words of MoveIt). `depth`: m, of the deepest contact at home, 0 if they do
-    not touch there. `share`: the fraction of the random poses in which they touch.
+    `first`, `second`: names of the links; for a URDF, the names in the file (`load_robot` merges links that a fixed joint connects, and
+    these names are those before the merge). `reason`: "Always": they touch in all random poses; "Default": they touch at home (the words of
+    MoveIt). `depth`: m, of the deepest contact at home, 0 if they do not touch there. `share`: the fraction of the random poses in which
+    they touch.
     """
 
     first: str
@@ -127,6 +128,8 @@ def touching_pairs(robot: Robot, poses: int = POSES) -> tuple[TouchingPair, ...]
 
     `poses`: number of random poses, which have a fixed seed. Fields and objects of a world are not tested.
     """
+    if poses < 1:
+        raise InvalidValue(f"poses={poses!r}: give at least 1")
     subject = Subject(replace(robot, field_pairs=robot.field_pairs[:0]))
     model = Model(subject.limited)
     names = {(i, j): _links(subject, i, j) for i, j in map(sorted, robot.solid_pairs.tolist())}
@@ -260,10 +263,10 @@ def _parting(subject: Subject, contact: Contact) -> str:
 
 
 def foreign_solids(subject: Subject) -> Iterator[Finding]:
-    """Yield a note for each pair of parts that are near each other at home without a force: a field of one overlaps a solid of the other.
+    """Yield a note for each pair of parts if, at home, a field of one overlaps a solid of the other, but causes no repulsive force there.
 
-    A repulsive force needs two fields that overlap, but no field of the solid's link touches this field. The note gives the deepest such
-    overlap.
+    Fields are volumes around solids. A force acts only between two fields that overlap, and this field has no contact with a field of the
+    solid's link. The note gives the deepest such overlap of the two parts.
     """
     deepest: dict[tuple[str, str], tuple[Shape, Shape, float]] = {}
     for field, solid, depth in subject.foreign:
@@ -313,8 +316,9 @@ def leave_out_touching(urdf: str | Path, out: Path | None = None, **options: Any
     """Write <disable_collisions> into an SRDF for every two links of a URDF whose solids touch at home or in all random poses.
 
     `out`: path of the SRDF; None: the SRDF that `load_robot` reads with this URDF, or a new one beside the URDF. The text of an existing
-    SRDF is not changed, only added to. The file is written completely or not at all. `options`: keyword arguments of `load_robot`. Raises
-    RobotFileError, and InvalidValue for a file that is not a URDF or a target that cannot be used.
+    SRDF is kept, and lines are added to it. The file is written completely or not at all. `options`: keyword arguments of `load_robot`.
+    Raises RobotFileError, and InvalidValue if `urdf` is not a URDF, if the name of the SRDF does not end in .srdf, or if `options` names
+    another SRDF and `out` exists already.
     """
     path = find_file(urdf, ROBOTS, "robot")
     if path.suffix.lower() != ".urdf":

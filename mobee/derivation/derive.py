@@ -29,9 +29,9 @@ LEFT_OUT = "solids that touch in most poses, or in every home that was tried"
 class Arm:
     """An arm with which a curious agent learns.
 
-    `part`: name of its part. `motors`: names of all motors of the arm. `joints`: names of those motors whose positions are the states of
-    the agent, in a lattice. `movement`: m, how far the best motor moves the end of the arm over its range; 0 for an arm that the caller of
-    `derive` requested.
+    `part`: name of its part. `motors`: names of all motors of the arm. `joints`: names of the motors to learn: the states of the agent are
+    the points of a lattice of their positions. `movement`: m, how far the end of the arm moves (mean over random poses) if one motor moves
+    over its whole range, for the motor that moves it farthest; 0 for an arm that the caller of `derive` requested.
     """
 
     part: str
@@ -44,12 +44,13 @@ class Arm:
 class Derived:
     """A robot that curious agents can use at once, and the derived values.
 
-    `robot`: the robot with all changes. `arms`: the arms that learn. `limited`: names of motors that had a range of a turn or more, which
-    is now half a turn to each side. `home_moved`: names of motors whose home was moved, so that no solids touch at home and fields (volumes
-    that cause repulsive forces) do not overlap. `narrowed`: names of motors with a narrower range; beyond it solids touch that fields
-    cannot keep apart. For combinations of several motors, clauses (conditions on motor positions) were added to the robot instead.
-    `left_out`: pairs of names of links that are no longer tested for contacts. `field`: width of the fields that were added [m], 0: none.
-    `gains`: gains of the control law: `Gains.derived()`, or the default ones for a robot that has its own fields.
+    `robot`: the robot with all changes. `arms`: the arms that learn. `limited`: names of motors that had a range of a turn or more; the
+    range is now at most half a turn to each side. `home_moved`: names of motors whose home was moved, so that no solids touch at home and
+    fields (volumes that cause repulsive forces) do not overlap. `narrowed`: names of motors whose range is narrower now. In the rest of the
+    old range, pairs of solids touch that fields cannot keep apart. For combinations of several motors, clauses (conditions on motor
+    positions) were added to the robot instead. `left_out`: pairs of names of links that are no longer tested for contacts. `field`: width
+    of the fields that were added [m], 0: none. `gains`: gains of the control law: `Gains.derived()`, or the default ones for a robot that
+    has its own fields.
     """
 
     robot: Robot
@@ -71,7 +72,10 @@ class Derived:
         return tuple(np.clip((self.robot.home[part.slice] - low) / (high - low), 0.0, 1.0).round(6).tolist())
 
     def space(self, arm: Arm) -> Lattice:
-        """Return the states and actions of an arm: a lattice with three levels of each joint to learn, the part's other motors at home."""
+        """Return the states and actions of an arm: a lattice of all combinations of three positions of each of `arm.joints`.
+
+        The positions are at 1/4, 1/2 and 3/4 of the joint's range. The other motors of the part stay at home.
+        """
         return Lattice(self.robot, arm.joints, rest=self.rest(arm))
 
 
@@ -83,8 +87,8 @@ def derive(robot: Robot, parts: Mapping[str, Sequence[str]] | None = None, seed:
 
     Args:
         robot: any robot.
-        parts: dict from the name of each part that should learn to the names of its motors whose positions are the states; None: they are
-            derived. A part that the robot does not have is made of these motors.
+        parts: dict from the name of each part that should learn to the names of its motors to learn, whose positions are the states; None:
+            the parts are derived. If the robot has no part of a name, a new part is made of exactly the motors listed for it.
         seed: seed of the random poses in which contacts and movements are measured.
 
     Raises:
@@ -217,11 +221,12 @@ def _requested(robot: Robot, wanted: Mapping[str, Sequence[str]]) -> tuple[Robot
         of = {robot.motor_table[robot.motor_index(name)].part for name in motors}
         if part in robot.parts and of != {part}:
             raise InvalidValue(f"part {part!r} has not all of {', '.join(motors)}. It has: {', '.join(robot.parts[part].motors)}.")
+    named = [name for motors in wanted.values() for name in motors]
+    if len(set(named)) < len(named):
+        raise InvalidValue(f"a motor is named twice in {', '.join(wanted)}: each motor belongs to one part.")
     unknown = {part: tuple(motors) for part, motors in wanted.items() if part not in robot.parts}
     if unknown:
-        dealt = [name for motors in unknown.values() for name in motors]
-        if len(set(dealt)) < len(dealt):
-            raise InvalidValue(f"a motor is named twice in {', '.join(unknown)}: each motor belongs to one part.")
+        dealt = {name for motors in unknown.values() for name in motors}
         rest = {part.name: tuple(name for name in part.motors if name not in dealt) for part in robot.parts.values()}
         robot = _regrouped(robot, unknown | {name: motors for name, motors in rest.items() if motors})
     return robot, tuple(Arm(part, robot.parts[part].motors, tuple(motors)) for part, motors in wanted.items())

@@ -6,19 +6,19 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from gymnasium.spaces import Discrete
 from gymnasium.utils.seeding import np_random
 
-from mobee.errors import InvalidValue, NotInstalled
+from mobee.errors import InvalidValue, NotInstalled, UnknownName
 from mobee.gymnasium.robots import ARM, FRAMES_PER_S, SEEDS, Portrait, RobotFile, WorldFile, model_of, plant_settings
 from mobee.learning.lattice import Lattice, Levels
 from mobee.learning.transitions import TransitionModel
 from mobee.plant import Outcome
 from mobee.rendering.picture import Picture
-from mobee.settings import Settings, accepts
+from mobee.settings import Range, Settings, accepts
 from mobee.simulation import OfflinePlant, PlantSettings
 
 try:
@@ -56,7 +56,7 @@ class TableTask(Settings):
     world: WorldFile = "table"
     plant: PlantSettings | None = None
     reward: Literal["gain"] | None = None
-    steps: int = 200
+    steps: Annotated[int, Range(gt=0)] = 200
 
 
 class TableEnv(ParallelEnv[str, int, int]):  # type: ignore[misc]  # PettingZoo has no type information
@@ -79,7 +79,7 @@ class TableEnv(ParallelEnv[str, int, int]):  # type: ignore[misc]  # PettingZoo 
         **changes: fields of `TableTask` by keyword, in place of the values in `settings`.
 
     Raises:
-        InvalidValue, UnknownName: the robot does not have a part or joint, or a level is not valid.
+        InvalidValue, UnknownName: the robot does not have a part or joint, or the fractions in `levels` are not valid.
     """
 
     metadata: dict[str, Any] = {"name": "MoBeE/Table-v0", "render_modes": ["rgb_array"], "render_fps": FRAMES_PER_S}
@@ -89,6 +89,8 @@ class TableEnv(ParallelEnv[str, int, int]):  # type: ignore[misc]  # PettingZoo 
         self.task = task = TableTask.made(settings, changes)
         self.render_mode = render_mode
         self._model = model_of(task.robot, task.world)
+        if task.neighbours is not NEIGHBOURS and (unknown := [name for name in task.neighbours if name not in task.parts]):
+            raise UnknownName("part with neighbours", unknown[0], task.parts)
         self.spaces = {part: self._space(part, joints) for part, joints in task.parts.items()}
         """The lattice of each agent: its states and actions."""
         self.possible_agents = list(self.spaces)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mobee.arrays import Array, real_array
+from mobee.arrays import Array, checked_threads, real_array
 from mobee.errors import InvalidValue, UnknownName
 from mobee.model.pose import Engine, Pose
 from mobee.model.snapshot import EMPTY, MAX_HANDS, NO_HANDS, Hand, Hands
@@ -66,8 +66,8 @@ class Model:
         """Return the hand of a marker: the links whose contacts with targets are ignored while the marker reaches; raises UnknownName.
 
         These are the marker's link and all links that it carries. If the marker at home is inside fields (volumes that cause repulsive
-        forces) of earlier links of the same part, take the one of these links that is nearest to the base: contacts of its fields, and of
-        the fields of all links that it carries, are ignored too.
+        forces) of earlier links of the same part, contacts of further fields with targets are ignored: the fields of one of these links,
+        the nearest to the base, and the fields of all links that it carries.
         """
         known = self._hand_of.get(marker)
         if known is None:
@@ -111,8 +111,8 @@ class Model:
         """
         one = self._one_pose(q)
         value: Array | bytes = self._checked(q) if one is None else one
-        if threads < 1:
-            raise InvalidValue(f"threads {threads}: must be at least 1")
+        if threads != 1:  # the usual case is not checked
+            checked_threads(threads)
         return Pose(self.robot, self._engine, value, self.world.snapshot, NO_HANDS if reaching is None else self.hands(reaching), threads)
 
     def track(self, skin: float = 0.02) -> Track:

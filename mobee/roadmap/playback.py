@@ -46,8 +46,8 @@ def reference(path: ArrayLike, speeds: ArrayLike, accelerations: ArrayLike, roun
         speeds: (n,) rad/s, largest speeds.
         accelerations: (n,) rad/s^2, largest accelerations.
         rounding: distance from a corner [rad, Euclidean over all motors] at which the motion leaves the straight line and joins the next
-            one. It is reduced to half the length of the shorter line at the corner. The curve between the lines passes the corner at half
-            this distance or less. 0: the motion stops at every corner.
+            one. It is reduced to half the length of the shorter line at the corner. The curve's smallest distance from the corner is at
+            most half this distance. 0: the motion stops at every corner.
         dt: time between two rows of the result [s].
 
     Raises:
@@ -85,6 +85,8 @@ def rounded(corners: ArrayLike, rounding: float) -> Array:
     points = real_array("corners", corners)
     steps = np.diff(points, axis=0)
     far = np.linalg.norm(steps, axis=1)
+    if not far.all():
+        raise InvalidValue(f"corners: {int(np.argmin(far))} and the next one are equal; give each corner once.")
     directions = steps / far[:, None]
     found, here = [points[:1]], points[0]
     for k in range(1, len(points)):
@@ -192,19 +194,20 @@ class Played:
 
     @property
     def lag(self) -> float:
-        """Largest distance between the real and planned positions of a motor at the same time [rad], of the motors that the plan moves."""
+        """Largest distance [rad] between the real and the planned position at the same time, over all motors that the plan moves."""
         return float(np.abs(self._q - self._wanted).max())
 
     @property
     def missing(self) -> float:
-        """Largest distance between the last real and the last planned position of a motor [rad], of the motors that the plan moves."""
+        """Largest distance [rad] between the last real and the last planned position, over all motors that the plan moves."""
         return float(np.abs(self._q[-1] - self._wanted[-1]).max())
 
     @property
     def off(self) -> float:
-        """Largest distance of the robot from the nearest planned pose, of any time [rad], over all ticks.
+        """Largest distance [rad] of the real motion from the planned path, over all ticks.
 
-        The distance of two poses is that of the motor that differs most, of the motors that the plan moves.
+        At each tick it is the distance from the nearest of all planned poses, whatever its time. The distance of two poses is the largest
+        difference of position among the motors that the plan moves.
         """
         from scipy.spatial import KDTree
 
@@ -229,13 +232,14 @@ def play(
 ) -> Played:
     """Simulate the robot on an `OfflinePlant` along a path (K, n) rad, from the first pose of the path.
 
-    The simulation ends when the robot is at rest after the planned motion, or 5 s after it.
+    After the planned motion the simulation continues until the robot is at rest, but for at most 5 s.
 
     Args:
         model: the robot in its world.
         path: as `Roadmap.path` returns it.
-        speed: share of the largest speed that the springs of the attractor can give.
-        rounding: distance before and after a corner at which the motion leaves the path [rad]; 0: it stops at every corner.
+        speed: factor on the largest speeds and accelerations of the planned motion, above 0 and at most 1 (`timed`).
+        rounding: a curve replaces the path from this distance [rad] before each corner to this distance after it. 0: the motion stops at
+            every corner.
         gains: of the control law; None: the default ones.
         seed: of the encoders' noise.
 
@@ -266,7 +270,7 @@ def play(
 
 
 def watched(model: Model, wanted: Reference, times: Array, q: Array, rested: bool) -> Played:
-    """Return the result of a motion that was observed as poses q (T, n) rad at times (T,) s; contacts are computed from the poses.
+    """Return the `Played` of an observed motion with the poses q (T, n) rad at times (T,) s; contacts are computed from the poses.
 
     `wanted`: the planned motion. `rested`: whether the robot came to rest.
     """
@@ -290,8 +294,10 @@ def touched_most(model: Model, q: Array, solid: Array) -> tuple[Contact, ...]:
 def timed(robot: Robot, path: Array, gains: Gains, speed: float = SPEED, rounding: float = ROUNDING, dt: float = 0.01) -> Reference:
     """Return the planned motion along a path (K, n) rad that the control law's springs can follow, one row per `dt` [s].
 
-    `speed`: share of the largest speed that the springs can give. `rounding`: distance before and after a corner at which the motion leaves
-    the path [rad]; 0: it stops at every corner. Raises InvalidValue if `speed` is not above 0 and at most 1.
+    `speed`: factor on the largest speeds and accelerations. At 1 these are 0.8 of what spring and damping allow (speed max_spring /
+    damping, acceleration max_spring / 2), or 0.8 of the motor's own limit if that is lower. `rounding`: a curve replaces the path from this
+    distance [rad] before each corner to this distance after it; 0: the motion stops at every corner. Raises InvalidValue if `speed` is not
+    above 0 and at most 1.
     """
     if not 0.0 < speed <= 1.0:
         raise InvalidValue(f"speed {speed}: must be above 0 and at most 1.")
@@ -304,8 +310,9 @@ def timed(robot: Robot, path: Array, gains: Gains, speed: float = SPEED, roundin
 def attractors(robot: Robot, wanted: Reference, gains: Gains, forces: Callable[[Array], Array] | None = None) -> Iterator[Array]:
     """Yield the attractor (n,) rad for each period of PERIOD (0.05 s), such that the law's spring produces the motion (eq. 5.7).
 
-    The attractor is ahead of the motion. Motors that do not move in the reference keep their position, and the last attractor is near the
-    end of the reference.
+    The attractor is the position to which the spring pulls the motors. During the motion it is ahead of the planned position, so that the
+    spring moves the motors. Without `forces`, the attractor of a motor that the plan does not move stays at its position, and the last
+    attractor is the last pose of the plan.
 
     Args:
         robot: the robot.
@@ -323,9 +330,10 @@ def attractors(robot: Robot, wanted: Reference, gains: Gains, forces: Callable[[
 
 
 def attractor_for(robot: Robot, gains: Gains, q: Array, force: Array) -> Array:
-    """Return the attractor (n,) rad whose spring pulls with `force` (n,) rad/s^2 at the posture q (n,) rad (eq. 5.7).
+    """Return the attractor (n,) rad whose spring has the force `force` (n,) rad/s^2 on the motors at the posture q (n,) rad (eq. 5.7).
 
-    The force is clipped to 0.8 of the spring's largest force, and the attractor to the motors' limits.
+    The attractor is the position to which the control law's spring pulls. Forces are reduced to at most 0.8 of the spring's largest force,
+    and the attractor is clipped to the motors' limits.
     """
     strength, stiffness = (gains.of_robot(name, robot) for name in ("max_spring", "stiffness"))
     force = np.clip(force, -_HARD * strength, _HARD * strength)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import tempfile
 import time
 from collections.abc import Callable, Mapping
@@ -29,7 +30,7 @@ NOT_SHOWN = ("q", "contacts", "event")  # on the page they are the body, and the
 
 
 class Player:
-    """The current position of a replay in the record of a run, and whether it plays. Its methods may be called from any thread."""
+    """The state of a replay: its position in the record of a run, and whether it is playing or paused. Any thread may call its methods."""
 
     def __init__(self, story: Story) -> None:
         self.story = story
@@ -44,7 +45,10 @@ class Player:
         with self._lock:
             self._advance()
             if "at" in query:
-                self._at = min(max(float(query["at"]), 0.0), self.story.length)
+                wanted = float(query["at"])
+                if math.isnan(wanted):
+                    raise ValueError("at=nan is not a position")
+                self._at = min(max(wanted, 0.0), self.story.length)
             if "toggle" in query:
                 self._plays = not self._plays
                 if self._plays and self._at >= self.story.length:

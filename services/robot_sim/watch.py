@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Measures the physics tick by tick: counts contacts and holds, detects rest, publishes `sim/truth`, records files."""
+"""Measures the physics tick by tick: counts contacts and holds, detects rest, publishes `sim/truth`, writes files."""
 
 from __future__ import annotations
 
@@ -29,7 +29,9 @@ REST_SPEED = np.deg2rad(1.0)  # rad/s; a part whose motors are slower is at rest
 
 @dataclass(slots=True)
 class Stops:
-    """Statistics of how parts come to rest in hold, in which they brake and stand still. A stop lasts from the last command to rest.
+    """Statistics of stops: a moving part is put in hold (it brakes and stands still), and comes to rest.
+
+    A stop begins at the last tick in which the part follows a command, and ends when the part is at rest.
 
     `count`: number of ended stops. `time_max`: largest duration of a stop [s]. `distance_max`: largest motion of a motor in a stop [rad].
     """
@@ -89,9 +91,10 @@ class Counters:
         self.tick_time = Percentiles()  # ms, gate to end of physics
 
     def count_gates(self, gates: Iterable[Gate]) -> None:
-        """Count the tick, the age of the oldest command in force, and whether all owned parts follow commands or at least one is in hold.
+        """Count the tick, and record the age of the oldest command that a part follows; call this once per tick.
 
-        `gates`: the safety gates of all parts. A part in hold brakes and stands still. Call this once per tick.
+        The tick also counts in `hold_ticks` if at least one owned part is in hold (it brakes and stands still), and in `armed_ticks` if all
+        owned parts follow commands. `gates`: the safety gates of all parts.
         """
         self.ticks += 1
         owned = [gate for gate in gates if gate.state != "idle"]
@@ -209,7 +212,10 @@ class Recorded:
         return self._inner.contact()
 
     def contacts(self) -> Mapping[str, float]:
-        """Return a dict from each pair in solid contact ("NAME NAME", sorted) to the largest depth [m] in the last tick."""
+        """Return the solid contacts of the last tick: a dict from the names of each pair ("NAME NAME", sorted) to the largest depth [m].
+
+        A solid contact is an overlap of two links, or of a link and an obstacle.
+        """
         return self._inner.contacts()
 
     def gap(self) -> float:
@@ -242,16 +248,20 @@ class Watch:
         self.counters = Counters()
 
     def mark(self, missed: int) -> None:
-        """Begin a measurement, with all counts at 0; `missed`: number of ticks skipped since the start of the process."""
+        """Begin a measurement, with all counts at 0.
+
+        `missed`: number of ticks skipped since the start of the process; the measurement counts only ticks that are skipped afterwards.
+        """
         self.counters = Counters()
         self.counters.missed_before = missed
 
     def reset(self) -> None:
-        """Drop the stops in progress; call this at the start of a new run. The counts of the measurement continue."""
+        """Drop stops in progress and the deepest contact; call this at the start of a new run. Counts of the measurement continue."""
         self.counters.stops.forget()
+        self._deepest = SolidContact()
 
     def measure(self) -> None:
-        """Count the states of the safety gates, contacts and stops; call this once per tick, after the physics.
+        """Count contacts, stops and the states of the safety gates; call this once per tick, after the physics.
 
         If the physics gives positions that are not finite, all gates enter the state fault.
         """
@@ -281,21 +291,24 @@ class Watch:
                 self._bus.event("info", "stopped", f"{part} came to rest", time=stopped[0], distance=stopped[1])
 
     def publish_truth(self) -> None:
-        """If the true state is due in this tick, measure the gap to the obstacles; publish the state if there is a subscriber."""
+        """Measure the gap to the obstacles, and publish the true state if there is a subscriber.
+
+        The method does both only in every `truth_period`-th tick, otherwise nothing.
+        """
         if self._bus.k % self._truth_period:
             return
         gap = self._backend.gap()
         self.counters.count_gap(gap)
+        deepest, self._deepest = self._deepest, SolidContact()
         if not self._truth.has_subscribers:
             return
         self._truth.put(
             q=self._backend.motors.q.tolist(),
-            depth=self._deepest.depth,
-            pair=self._deepest.pair,
+            depth=deepest.depth,
+            pair=deepest.pair,
             gap=gap,
             objects=[
                 ObjectTruth(name=thing.name, position=thing.position.tolist(), quaternion=quaternion_from_matrix(thing.rotation).tolist())
                 for thing in self._backend.world.objects.values()
             ],
         )
-        self._deepest = SolidContact()

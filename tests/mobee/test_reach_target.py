@@ -44,3 +44,7 @@ def test_the_reward_falls_with_the_distance_in_units_of_the_scale() -> None:
 def test_a_marker_either_faces_the_target_or_has_a_normal() -> None:
     with pytest.raises(InvalidValue, match="not both"):
         ReachTarget(np.zeros(3), normal=np.array([0.0, 0.0, 1.0]), faces=True)
+
+
+def test_a_negative_zero_is_the_same_position() -> None:
+    assert ReachTarget(np.array([0.3, -0.0, 0.5])).position.tobytes() == ReachTarget(np.array([0.3, 0.0, 0.5])).position.tobytes()

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+import urllib.error
 import urllib.request
 from pathlib import Path
 from typing import Any
@@ -60,6 +61,9 @@ def test_a_run_is_seen_again_at_any_time(tmp_path: Path) -> None:
         assert [event["text"] for event in seen["events"]] == ["at 1.0"]
         assert seen["cards"] == [] and seen["body"]["q"] == pytest.approx([0.1, 0.5])
         assert len(seen["body"]["links"]) == len(load_robot(tmp_path / "arm.xml").links)
+        for wrong in ("seek?at=nan", "seek?at=soon"):
+            with pytest.raises(urllib.error.HTTPError, match="400"):
+                get(wrong)
         get("seek?at=7.3")
         seen = news_at(7.3)
         assert seen["cards"][0]["now"] == "pan +10°"

@@ -76,11 +76,21 @@ class Compiled:
     camera_modes: tuple[str, ...]  # fixed, track, ...
 
     def where(self, kind: str, index: int) -> str:
-        """Return "file:line" of an element; `kind`: as in `names`, `index`: MuJoCo's id of the element."""
+        """Return "file:line" of an element; `kind`: a key of the dict `names`, `index`: MuJoCo's id of the element."""
         return f"{self.path}:{max(self.lines[kind][index], 1)}"
 
 
 KINDS = ("body", "joint", "geom", "site", "key", "equality", "actuator", "tendon", "camera", "mesh")
+
+
+def held_positions(model: Any, joint_equality: int) -> dict[int, float]:
+    """Return the position [rad or m] of each joint that an equality with a single joint fixes; the keys are MuJoCo's joint numbers.
+
+    `model`: MuJoCo's model. `joint_equality`: MuJoCo's number of this kind of equality, mjEQ_JOINT.
+    """
+    fixed = np.flatnonzero((model.eq_type == int(joint_equality)) & (model.eq_active0 != 0) & (model.eq_obj2id < 0)).tolist()
+    joints = model.eq_obj1id[fixed].tolist()
+    return {joint: float(model.qpos0[model.jnt_qposadr[joint]] + model.eq_data[k, 0]) for k, joint in zip(fixed, joints, strict=True)}
 
 
 def compile_mjcf(path: Path) -> Compiled:
@@ -108,6 +118,8 @@ def compile_mjcf(path: Path) -> Compiled:
     kinds = _kinds(mujoco.mjtJoint, "mjJNT_", model.jnt_type)
     moving = [kind in ("hinge", "slide") for kind in kinds]
     data.qpos[model.jnt_qposadr[moving]] = 0.0
+    for joint, position in held_positions(model, mujoco.mjtEq.mjEQ_JOINT).items():
+        data.qpos[model.jnt_qposadr[joint]] = position
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)
     mujoco.mj_camlight(model, data)

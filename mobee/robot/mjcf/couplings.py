@@ -15,14 +15,14 @@ Line = tuple[int, int, float, float]  # joint one = scale * joint other + offset
 
 
 def drives_of(compiled: Compiled) -> dict[int, Drive]:
-    """Return a dict from MuJoCo's number of each hinge and slide that moves to its drive (motor, scale and offset).
+    """Return the drive (motor, scale and offset) of each hinge and slide that moves; the keys are MuJoCo's numbers of these joints.
 
     A joint equality couples its two joints. An actuator of a fixed tendon moves the joints of the tendon together, in proportion to their
     coefficients, unless one of these joints has its own actuator. A group of coupled joints has one motor. Its name is that of the joint in
     the group that has an actuator; if none has one, that of the joint that does not depend on another. Joints that an equality holds at a
     constant position have no drive.
     """
-    held = set(held_joints(compiled))
+    held = held_joints(compiled)
     moving = [j for j, kind in enumerate(compiled.joint_kinds) if kind in ("hinge", "slide") and j not in held]
     links: dict[int, list[Line]] = defaultdict(list)
     slaves: set[int] = set()
@@ -49,14 +49,10 @@ def drives_of(compiled: Compiled) -> dict[int, Drive]:
     return drives
 
 
-def held_joints(compiled: Compiled) -> dict[int, float]:
-    """Return the joints that an equality without a second joint holds: MuJoCo's number of the joint -> its position [rad or m]."""
+def held_joints(compiled: Compiled) -> set[int]:
+    """Return MuJoCo's numbers of the joints that an equality with a single joint fixes; bodies are drawn at its position."""
     model = compiled.model
-    return {
-        int(model.eq_obj1id[k]): float(model.qpos0[model.jnt_qposadr[model.eq_obj1id[k]]] + model.eq_data[k, 0])
-        for k in _active(compiled, "joint")
-        if model.eq_obj2id[k] < 0
-    }
+    return {int(model.eq_obj1id[k]) for k in _active(compiled, "joint") if model.eq_obj2id[k] < 0}
 
 
 def actuated(compiled: Compiled) -> dict[int, list[int]]:

@@ -6,7 +6,10 @@ from pathlib import Path
 import pytest
 
 from mobee.check import check_robot
+from mobee.check.touching import touching_pairs
+from mobee.errors import InvalidValue
 from mobee.model import World, sphere
+from mobee.robot.load import load_robot
 from tests.mobee.check.arm import arm, named
 
 PALM = ("<marker", '<sphere name="palm" radius="0.02"/><marker')
@@ -73,3 +76,8 @@ def test_in_a_world_one_note_says_what_is_touched_at_home(tmp_path: Path) -> Non
     assert far == "at home in this world of 1 object the robot touches nothing"
     (near,) = notes((-0.2, 0.0, 0.2))
     assert "touches " in near and "'upper' and 'rock' (" in near
+
+
+def test_no_poses_are_refused() -> None:
+    with pytest.raises(InvalidValue, match="poses=0"):
+        touching_pairs(load_robot("katana"), poses=0)

@@ -123,6 +123,8 @@ def test_requested_joints_make_the_part(tmp_path: Path) -> None:
         derive(robot, {"mine": ("left_shoulder_joint00",)})
     with pytest.raises(InvalidValue, match="left_arm.* has not all of r_elbow"):
         derive(load_robot("icub"), {"left_arm": ("r_elbow",)})
+    with pytest.raises(InvalidValue, match="named twice in left_arm, mine"):
+        derive(load_robot("icub"), {"left_arm": ("l_elbow",), "mine": ("l_elbow",)})
 
 
 def test_a_derived_robot_is_written_and_learns_without_contact(tmp_path: Path) -> None:

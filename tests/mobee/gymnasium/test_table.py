@@ -64,3 +64,12 @@ def test_a_part_whose_action_does_not_exist_rests() -> None:
 def test_joints_of_another_part_are_refused() -> None:
     with pytest.raises(mobee.InvalidValue, match="give motors of torso"):
         TableEnv(parts={"torso": ("l_elbow", "l_shoulder_yaw")})
+
+
+def test_neighbours_of_another_part_and_episodes_without_steps_are_refused() -> None:
+    arm = {"left_arm": ("l_elbow", "l_shoulder_yaw")}
+    with pytest.raises(mobee.UnknownName, match="left_arm"):
+        TableEnv(parts=arm, neighbours={"left_arn": 2})
+    with pytest.raises(mobee.InvalidValue, match="steps"):
+        TableEnv(parts=arm, steps=0)
+    assert TableEnv(parts=arm, neighbours={"left_arm": 2}).action_space("left_arm").n == 2

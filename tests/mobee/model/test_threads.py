@@ -87,8 +87,9 @@ def test_any_number_of_threads_gives_the_same_bits(poses: int, objects: int, rng
 
 def test_fewer_threads_than_one_are_refused() -> None:
     robot = loaded("katana")
-    with pytest.raises(InvalidValue, match="threads 0"):
-        mobee.Model(robot).evaluate(robot.home, threads=0)
+    for threads in (0, 2.5, 5000):
+        with pytest.raises(InvalidValue, match=f"threads={threads}: give a whole number from 1 to 1024"):
+            mobee.Model(robot).evaluate(robot.home, threads=threads)  # type: ignore[arg-type]
 
 
 def test_results_of_an_evaluation_stay_valid_after_the_model_is_deleted(rng: np.random.Generator) -> None:

@@ -75,6 +75,8 @@ def test_a_path_may_go_back_and_forth() -> None:
     found = reference([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.0, 0.0, 0.0]], SPEEDS, ACCELERATIONS, 0.1, DT)
     assert found.q[:, 0].max() == pytest.approx(0.25, abs=0.003)  # turned round at half of the rounding before the corner
     assert np.linalg.norm(np.diff(rounded([[0.0], [1.0], [0.0]], 0.1), axis=0), axis=1).max() < 0.005
+    with pytest.raises(InvalidValue, match="corners: 1 and the next one are equal"):
+        rounded([[0.0], [1.0], [1.0], [0.0]], 0.1)
 
 
 @pytest.mark.parametrize(

@@ -80,6 +80,18 @@ def test_an_equality_gives_two_joints_one_motor(tmp_path: Path) -> None:
     assert robot.motor_table[robot.motor_index("knee")].max_torque == pytest.approx(50.0)
 
 
+def test_a_joint_that_an_equality_holds_stays_at_its_position(tmp_path: Path) -> None:
+    held = '<equality><joint joint1="elbow" polycoef="0.7 0 0 0 0"/></equality>'
+    path = mjcf_file(tmp_path, TREE + held)
+    robot, free = read(path), read(mjcf_file(tmp_path, TREE))
+    assert set(free.motors) - set(robot.motors) == {"elbow"}
+    turned = free.home.copy()
+    turned[free.motor_index("elbow")] = 0.7 + np.deg2rad(-20.0)  # beside its reference position
+    expected, found = Model(free).evaluate(turned), Model(robot).evaluate(robot.home)
+    for marker in set(robot.markers) & set(free.markers):
+        assert found.position(marker) == pytest.approx(expected.position(marker), abs=1e-9)
+
+
 def test_a_driven_tendon_moves_its_joints_in_proportion(tmp_path: Path) -> None:
     tendon = '<tendon><fixed name="split"><joint joint="f1" coef=".5"/><joint joint="f2" coef=".25"/></fixed></tendon>'
     robot = read(mjcf_file(tmp_path, f'{TREE}{tendon}<actuator><position tendon="split"/></actuator>'))
