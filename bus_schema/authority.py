@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Who may write, read, call and answer which keys, from the streams and calls of the contract.
+"""The rights of each process on the bus: the keys that it may write, read, call and answer.
 
-The table is `writers` and `readers` of each `Stream` and `servers` and `callers` of each `Call`.  docs/bus.md, the tests of the services
-and the access list of a secured system are made from it.
+The rights follow from the fields `writers` and `readers` of each `Stream`, and `servers` and `callers` of each `Call`.  docs/bus.md, the
+tests of the services and the access list of a secured system are made from the same fields.
 """
 
 from __future__ import annotations
@@ -64,9 +64,9 @@ def party_of(name: str) -> Party:
 def may_call(who: str, key: str) -> bool:
     """Return whether the table of calls (`bus_schema.rpc.CALLS`) lets the process `who` make the call `key`.
 
-    The result is always True for operators, clients, observers and drivers, because these programs choose their names themselves. For an
-    agent, the part in the key is not checked. In a secured system the router, which knows the identity of each process, is stricter in both
-    cases.
+    The result is always True for operators, clients, observers and drivers, because these programs choose their names themselves. An agent
+    may make its calls with any part in the key. A secured system is stricter: its router knows the identity of each process, and allows
+    operators, clients, observers and drivers only the calls of the table, and an agent only its own part (`rights_of`).
     """
     party = party_of(who)
     allowed = _expressions(_patterns("callers", party), ("*",), "*")
@@ -82,8 +82,8 @@ def _matches(expression: str, key: str) -> bool:
 def rights_of(name: str, party: Party) -> Rights:
     """Return what the identity `name` of the party `party` may do on the bus.
 
-    A key that contains {service} or {source} may be written and answered only under the identity's own name. An agent may write and call
-    only the keys of its own part.
+    In the pattern of a key, {service} and {source} stand for the name of the process. An identity may write and answer such a key only with
+    its own name in it. Of the keys with {part}, an agent may write and call only those of its own part (agent_PART).
     """
     own, part = _own_names(name, party), name.removeprefix(AGENT) if party == "agent" else "*"
     written = [cls for cls in streams() if party in cls.stream.writers]

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Encodes messages as msgpack, and decodes them; a message of a wrong type, version, length or with NaN is refused with a reason."""
+"""Encodes messages as msgpack, and decodes them.
+
+A message is refused, with a reason, if its type, its version or the length of a vector is wrong, or if it contains NaN or infinity.
+"""
 
 from __future__ import annotations
 
@@ -54,8 +57,9 @@ def decode(cls: type[_S], payload: bytes, encoding: str, *, part: int | None = N
     """Return the message of the type `cls` that is encoded in `payload`, after all checks.
 
     `encoding`: the encoding string that came with the payload. `part`, `robot`: number of motors that PartVector and RobotVector fields
-    must have (None: not checked). Raises Refused with the reason: type or version (the encoding string, or the field `v`), decode (the
-    payload does not match the struct), length (of a vector), or value (NaN or infinity).
+    must have (None: not checked). Raises Refused with one of these reasons: type (another message type in the encoding string), version
+    (another version in the encoding string or in the field `v`), decode (the payload does not match the struct), length (a vector has a
+    wrong length), or value (NaN or infinity).
     """
     if encoding != encoding_of(cls):
         _refuse_encoding(cls, encoding)

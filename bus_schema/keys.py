@@ -37,8 +37,8 @@ def goal(part: str, verb: str) -> str:
 def waypoint(part: str) -> str:
     """Return the key of the call that marks the newest safe pose as a waypoint, to which the port filter may later move the robot back.
 
-    If the port filter has found no motion back, the call accepts the present pose as safe. `part`: name of any part, since the call
-    concerns the whole robot; * means all parts.
+    If the port filter is stuck, because it has found no motion back, the call instead declares the present pose safe. `part`: name of any
+    part, since the call concerns the whole robot; * means all parts.
     """
     return f"{_part_or_all(part)}/rpc/waypoint"
 

@@ -52,7 +52,10 @@ class Plant(Protocol):
 
 @runtime_checkable
 class Described(Protocol):
-    """A plant whose settings are recorded with an agent's transitions, so that the agent continues them only with equal settings."""
+    """A plant that has settings. An agent records them in its store, with its transitions.
+
+    Later, an agent can continue in that store only if its plant has the same settings.
+    """
 
     @property
     def settings(self) -> dict[str, Any]:

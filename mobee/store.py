@@ -31,8 +31,8 @@ class AgentFile:
         durable: False: a commit does not wait for the disk, so that it survives a kill but not a power cut; for learning offline.
 
     Raises:
-        MobeeError: from every method, in one line with the file and what to do; InUse: another process writes this agent's data; NoRoom:
-            the disk is full, and the same call succeeds when there is room.
+        MobeeError: every method can raise it; the message is one line, which names the file and the remedy. InUse: another process writes
+            this agent's data. NoRoom: the disk is full; the same call succeeds when there is room.
     """
 
     def __init__(self, path: str | Path, agent: str, read_only: bool = False, durable: bool = True) -> None:
@@ -169,7 +169,10 @@ class TransitionStore(AgentFile):
         self._last = self._newest()
 
     def append(self, transition: Transition) -> None:
-        """Commit one transition; it is on disk when this method returns. Raises MobeeError unless its number follows the last one."""
+        """Commit one transition; it is on disk when this method returns.
+
+        Raises MobeeError unless its number `n` is the number of the last stored transition plus 1 (1 for the first transition).
+        """
         if transition.n != self._last + 1:
             raise MobeeError(f"{self.path}: {self.agent} has {self._last} transitions: append number {self._last + 1}, not {transition.n}.")
         row = (
@@ -190,11 +193,12 @@ class TransitionStore(AgentFile):
         self._last = transition.n
 
     def continue_from(self, source: str | Path, settings: dict[str, Any]) -> None:
-        """Copy this agent's transitions from the file `source`; nothing is done if this file already has settings or transitions of it.
+        """Copy this agent's transitions from the file `source`; do nothing if this file already has settings or transitions of the agent.
 
-        They must have been recorded with `settings`, except the settings of the plant: transitions that were made offline may be continued
-        live. The number of copied transitions and the settings of their plant are recorded in the setting "continued". Raises MobeeError
-        if `source` has no transitions of the agent, or other settings.
+        The settings of the agent in `source` must equal `settings`; only those of the plant may differ, so that an agent can learn offline
+        first and then live. `settings` are recorded in this file. The number of copied transitions and the settings of the plant on which
+        they were made are recorded too, in the setting "continued". Raises MobeeError if `source` has no transitions of the agent, or if
+        its settings differ.
         """
         if self._last or self.settings():
             return

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Locks that let only one process write the data of an agent into a file; a lock ends with its process at the latest.
+"""Locks that let only one process write the data of an agent into a file; when a process ends, its locks end too.
 
-A lock covers one byte of a second file, named as the data file with "-lock" appended.  Such locks belong to a process: the same process
-may lock twice, and all its locks on a file end when it closes any descriptor of that file.  Therefore a process opens the file once and
-counts its locks.
+A lock covers one byte of a second file, named as the data file with "-lock" appended.  The operating system gives such a lock to a process,
+not to a descriptor.  So the same process may lock a byte twice; and if it closes any descriptor of the file, all its locks on the file end.
+Therefore a process opens the file only once and counts its locks.
 """
 
 from __future__ import annotations

@@ -149,7 +149,7 @@ def scene(of: Handle, volumes: NDArray[Any], roles: Ints, carried: Ints, side: i
 
     `of`: handle of the robot. `volumes` (N,) and `roles` (N,): volume and role of each object of the world, as in
     `mobee.model.snapshot.Snapshot`. `carried`: indices of the objects that the robot carries. `side`: number of cells along the longest
-    side of the grid into which the free objects are sorted.
+    side of the grid into which the core sorts the obstacles and targets that the robot does not carry.
     """
     tables = _WorldTables(len(roles), len(carried), side, address(volumes), address(roles), address(carried))
     return Handle(_scene_new(of.at, ctypes.addressof(tables)), _scene_free, of)
@@ -178,8 +178,8 @@ def jacobians(of: Handle, q: Array, link: int, point: Array) -> Array:
 class Room:
     """Buffers in which the core evaluates poses, for one thread at a time; they are reused, because allocation takes longer than one pose.
 
-    `rows`: buffer into which `evaluate_one` writes at most `most` contacts. `torque`: buffer for the projection of the contacts to the
-    motors, (n,) m^2/rad. `asked`: the first argument of the compiled function `evaluate_one`.
+    `motors`: the number n of motors. `rows`: buffer into which `evaluate_one` writes at most `most` contacts. `torque`: buffer for the
+    projection of the contacts to the motors, (n,) m^2/rad. `asked`: the first argument of the compiled function `evaluate_one`.
     """
 
     __slots__ = ("_at", "_handle", "_request", "asked", "most", "rows", "torque")
@@ -198,11 +198,11 @@ class Room:
         """Return the contacts in the poses q (B, n) rad, and their projection to the motors, (B, n) m^2/rad.
 
         The contacts are two arrays: numbers (c, 6) and reals (c, 7), the columns of `mobee.model.contact.ContactTable`. The projection is
-        the sum of J^T (depth * normal) over the contacts of fields, volumes that cause repulsive forces; J is the Jacobian of the contact's
-        point. `scene`: handle of the scene. `hands`: up to two reaching hands as four link indices, two for each hand, as
-        `mobee.model.snapshot.hand_numbers` returns them; their contacts with targets are ignored. `cut`: True: a contact acts only on the
-        motors of the part that touches, as in the MoBeE program of 2014; False: also on the motors nearer to the base. `threads`: number of
-        threads.
+        the sum of J^T (depth * normal) over the contacts of fields; J is the Jacobian of the contact's point. A field is a volume that
+        causes a repulsive force. `scene`: handle of the scene. `hands`: up to two reaching hands as four link indices, two for each hand,
+        as `mobee.model.snapshot.hand_numbers` returns them; their contacts with targets are ignored. `cut`: True: a contact acts only on
+        the motors of the part that touches, as in the MoBeE program of 2014; False: also on the motors nearer to the base. `threads`:
+        number of threads.
         """
         torque = np.empty(q.shape)
         request = _Request(scene.at, address(q), address(torque), len(q), cut, threads, (INTEGER * 4)(*hands))
@@ -227,9 +227,9 @@ class Room:
 class Following:
     """A neighbour list of a robot in a scene: the pairs of volumes that are near each other in consecutive poses; for one thread at a time.
 
-    `skin`: m; pairs nearer than this are in the list, which is made again when two volumes may have approached each other by the skin.
-    `cut`: True: a contact acts only on the motors of the part that touches. `at`: address of the list in the core, which a plant of the
-    core uses; it is valid after `enter`, while this object exists.
+    `skin`: a distance [m]; pairs nearer than this are in the list. The list is made again when two volumes may have approached each other
+    by this distance. `cut`: True: a contact acts only on the motors of the part that touches. `at`: address of the list in the core, which
+    a plant of the core uses; it is valid after `enter`, while this object exists.
     """
 
     def __init__(self, skin: float, cut: bool) -> None:
@@ -251,8 +251,8 @@ class Following:
         """Return the contacts in the consecutive poses q (B, n) rad, and their projection to the motors, (B, n) m^2/rad.
 
         The contacts are two arrays: numbers (c, 6) and reals (c, 7), the columns of `mobee.model.contact.ContactTable`. The projection is
-        the sum of J^T (depth * normal) over the contacts of fields, volumes that cause repulsive forces; J is the Jacobian of the contact's
-        point.
+        the sum of J^T (depth * normal) over the contacts of fields; J is the Jacobian of the contact's point. A field is a volume that
+        causes a repulsive force.
         """
         torque = np.empty(q.shape)
         count = _follow(self.at, q.tobytes(), len(q), address(torque))
@@ -261,8 +261,8 @@ class Following:
     def state(self) -> tuple[int, int, int]:
         """Return three numbers, for tests: the state of the list, the number of pairs in it, and the number of poses for which it was used.
 
-        States: 0: nothing is stored; 1: only the last pose is stored; 2: the list is stored; 3: as 1, since the world changed while a list
-        was in use.
+        States: 0: nothing is stored; 1: only the last pose is stored; 2: the list is stored; 3: the world or the reaching hands changed
+        while a list was in use, and the next pose makes a new list.
         """
         found = np.empty(3, dtype=np.int64)
         _neighbours_state(self.at, address(found))
@@ -280,9 +280,9 @@ def sines_cosines(angles: Array) -> tuple[Array, Array]:
 def swung(of: Handle, then: Array, now: Array, shapes: int) -> Array:
     """Return upper bounds (S, L) m of the motion of each shape between two poses, for tests.
 
-    Rows are shapes, in the order of the robot's tables. Column k bounds the motion relative to the common ancestor of the shape's link and
-    link k: the last link that carries both. `of`: handle of the robot. `then`, `now`: (J,) rad or m, positions of all joints in the two
-    poses. `shapes`: the number S of shapes.
+    Rows are shapes, in the order of the robot's tables. Column k bounds the motion of a shape relative to the last link that carries
+    both the shape and link k (their last common ancestor). `of`: handle of the robot. `then`, `now`: (J,) rad or m, positions of all joints
+    in the two poses. `shapes`: the number S of shapes.
     """
     out = np.empty((shapes, len(then) + 1))
     _swung(of.at, address(then), address(now), address(out))
@@ -300,11 +300,12 @@ def place(of: Handle, q: Array, shapes: int) -> NDArray[Any]:
 
 
 class Grid(NamedTuple):
-    """The grid of cells by which the compiled core sorts the free world objects of a scene to find contacts.
+    """The grid of cells by which the compiled core sorts world objects of a scene to find contacts.
 
-    `large`: number of large objects, which are in no cell. `cells`: number of cells along x, y and z. `objects`: (N, 2), the large objects
-    first, then those of each cell: index in the world, and 1 for a target, else 0. `starts`: (number of cells + 1,) row of `objects` at
-    which each cell begins, and the end. `centers`: (N, 3) m, root frame, of the objects in the rows of `objects`.
+    The grid contains the obstacles and targets that the robot does not carry. `large`: number of large objects, which are in no cell.
+    `cells`: number of cells along x, y and z. `objects`: (N, 2), the large objects first, then those of each cell: index in the world, and
+    1 for a target, else 0. `starts`: (number of cells + 1,): the objects of cell k are the rows starts[k] to starts[k + 1] - 1 of
+    `objects`. `centers`: (N, 3) m, root frame, of the objects in the rows of `objects`.
     """
 
     large: int
@@ -315,9 +316,9 @@ class Grid(NamedTuple):
 
 
 def grid_of(scene: Handle) -> Grid:
-    """Return the grid of cells by which the compiled core sorts the free world objects of a scene to find contacts; only for tests.
+    """Return the grid of cells by which the compiled core sorts world objects of a scene to find contacts; only for tests.
 
-    `scene`: handle of the scene in the core.
+    The grid contains the obstacles and targets that the robot does not carry. `scene`: handle of the scene in the core.
     """
     counts = np.empty(5, dtype=np.int64)
     _scene_counts(scene.at, address(counts))

@@ -35,13 +35,19 @@ class Settle(ctypes.Structure):
 
 
 class SettleTest(ctypes.Structure):
-    """The state of the settle test of one action: the times [s] at which the action started and at which it is checked next."""
+    """The state of the settle test, which ends an action when all its motors are slow, or at a timeout.
+
+    `start`: time at which the action started [s]. `next_check`: time of the next check [s].
+    """
 
     _fields_ = (("start", REAL), ("next_check", REAL))
 
 
 class Law(ctypes.Structure):
-    """The control law with its gains, as the core has it (core/law.hpp); the caller keeps the tables alive to which it points."""
+    """The control law with its gains, as the core has it (core/law.hpp).
+
+    It has the addresses of tables; the caller keeps these tables alive.
+    """
 
     _fields_ = (
         *((name, View) for name in ("motors", "active", "constrained", "parts", "clauses", "rows", "entries")),

@@ -59,11 +59,11 @@ finite.
 
 
 class DebiasedCounts(ctypes.Structure):
-    """The structure `DebiasedCounts` of core/observations.cpp: outcome probabilities from real counts and a weak prior.
+    """The structure `DebiasedCounts` of core/observations.cpp: outcome probabilities from observed outcomes and a weak prior.
 
-    The imagined counts of thesis Algorithms 6 and 8 do not enter the probabilities. `probabilities`: (S, A, B), for each state-action the
-    probability of each of B bins; the function `believe` of this module updates them. `prior` (B,): the prior's count of each bin.
-    `total`: the sum of the prior. `at`: address of the structure, which keeps its arrays alive.
+    Imagined counts, which thesis Algorithms 6 and 8 add without an observation, do not enter the probabilities. `probabilities`:
+    (S, A, B), for each state-action the probability of each of B bins; the function `believe` of this module updates them. `prior` (B,):
+    the prior's count of each bin. `total`: the sum of the prior. `at`: address of the structure, which keeps its arrays alive.
     """
 
     _fields_ = (("probability", ADDRESS), ("prior", ADDRESS), ("sum", REAL))
@@ -78,9 +78,10 @@ class OutcomeCounts(ctypes.Structure):
     """The counts of a transition model for the core, `OutcomeCounts` of core/observations.cpp; observations write into its arrays.
 
     `arrays`: the arrays by the name of the structure's field, such as "count" (S, A, B); they are kept alive. `over_states`: 0: the reward
-    is computed over the outcomes of the state-action; above 0: over this number of states, each with one count before the first
-    observation. `forgetting`: factor by which the earlier real counts of a state-action are multiplied at each of its observations. `at`:
-    address of the structure. Functions of the core do not check the indices of states, actions and outcomes.
+    is the divergence of distributions over the outcomes of the state-action; above 0: of distributions over this number of states, each
+    with one count before the first observation. `forgetting`: factor by which the counts of earlier observations of a state-action are
+    multiplied at each new one. `at`: address of the structure. Functions of the core do not check the indices of states, actions and
+    outcomes.
     """
 
     _fields_ = (
@@ -126,8 +127,8 @@ _deplete = function("deplete", ADDRESS, ADDRESS, ADDRESS, INTEGER, INTEGER, ADDR
 def expected_gains(table: TransitionTable, counts: Array, totals: Array, tries: Ints, gains: Array) -> None:
     """Replace the `gains` (S, A) of all tried state-actions by the expected information gain of their next try [nats], in place.
 
-    `counts` (S, A, B): the count of the outcome in each bin, above 0 wherever the probability is above 0. `totals` (S, A): sums of `counts`
-    over the bins. `tries` (S, A): how often each state-action was tried; gains of untried ones are not changed.
+    `counts` (S, A, B): the count of each bin's outcome, above 0 for all bins whose probability in `table` is above 0. `totals` (S, A): sums
+    of `counts` over the bins. `tries` (S, A): how often each state-action was tried; gains of untried ones are not changed.
     """
     following = _NextCounts(address(counts), address(totals))
     _expected_gains(table.at, ctypes.addressof(following), address(tries), address(gains))
@@ -136,9 +137,9 @@ def expected_gains(table: TransitionTable, counts: Array, totals: Array, tries: 
 def deplete(table: TransitionTable, counts: Array, totals: Array, action_values: Array, state: int, steps: int, gains: Array) -> None:
     """Simulate the next `steps` best actions from a state, each with its most likely outcome, and reduce the gains of these actions.
 
-    `gains` (S, A), nats, changes in place: each gain is reduced as an observation of that outcome would reduce it. `counts` (S, A, B),
-    `totals` (S, A): the counts of the outcomes, and their sums over the bins. `action_values` (S, A): the best action of a state has the
-    largest value; -inf if there is no such action.
+    `gains` (S, A): the expected information gains [nats] of the next tries. They change in place: each gain is reduced as an observation
+    of that outcome would reduce it. `counts` (S, A, B), `totals` (S, A): the counts of the outcomes, and their sums over the bins.
+    `action_values` (S, A): the best action of a state has the largest value; -inf for an action that the state does not have.
     """
     following = _NextCounts(address(counts), address(totals))
     _deplete(table.at, ctypes.addressof(following), address(action_values), state, steps, address(gains))
@@ -165,9 +166,9 @@ def weighted_sums(
 
     An entry of the record has the values of one action on one target. `out` (2, actions), to which the results are added: the sum of the
     weighted values, and the sum of the weights. `targets` (..., 3) m: only the first `sizes[0]` rows are used. `keys` (..., 2): action and
-    index of the target of each entry; `sums` (..., 2): sum and number of its values; of both only the first `sizes[1]` rows are used.
-    `weighing`: a scale and a largest distance [m]: the weight of a target at a distance d is 1 / (1 + d / scale), and 0 beyond the largest
-    distance.
+    index of the target of each entry. `sums` (..., 2): sum and number of the values of each entry. Only the first `sizes[1]` entries are
+    used. `weighing`: a scale and a largest distance [m]: the weight of a target at a distance d is 1 / (1 + d / scale), and 0 beyond the
+    largest distance.
     """
     history = _History(address(targets), address(keys), address(sums), *sizes, *weighing)
     totals = address(out)

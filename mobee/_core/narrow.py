@@ -55,8 +55,8 @@ class Volumes:
     def place(self, at: int, kind: str, half: Sequence[float] | Reals, position: Reals, rotation: Reals) -> None:
         """Set the volume at index `at`, with `position` (3,) m and `rotation` (3, 3) in the root frame.
 
-        `kind`: "sphere", "capsule", "cylinder", "box" or "convex". `half` [m]: (radius,); (radius, half height); half edges (3,); () for a
-        hull, whose corners are set by `hull`.
+        `kind`: "sphere", "capsule", "cylinder", "box" or "convex" (a hull). `half` [m]: (radius,) of a sphere; (radius, half height) of a
+        capsule or cylinder; half edges (3,) of a box; () for a hull, whose corners are set by `hull`.
         """
         row = self.table[at]
         size = np.zeros(3)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The motors of a simulated robot and the offline plant's ticks: declares core/motors.cpp and core/plant.cpp."""
+"""Simulated motors, and the control loop of a simulated robot (the offline plant): declares core/motors.cpp and core/plant.cpp."""
 
 from __future__ import annotations
 
@@ -36,7 +36,10 @@ ALL_TICKS_DONE, ACTION_ENDED, STATE_LOST = range(3)
 
 
 class Motors(ctypes.Structure):
-    """The motors of a simulated robot, as the core has them (core/motors.cpp); the caller keeps the tables alive to which it points."""
+    """The motors of a simulated robot, as the core has them (core/motors.cpp).
+
+    The structure has the addresses of tables; the caller keeps these tables alive.
+    """
 
     _fields_ = (
         ("living", View), ("constants", View), ("state", ADDRESS), ("line", ADDRESS), ("rows", INTEGER), ("newest", INTEGER),
@@ -47,8 +50,8 @@ class Motors(ctypes.Structure):
 class Braking(ctypes.Structure):
     """The tables with which the core limits the commands of n motors so that they can always brake before their limits.
 
-    `lower`, `upper`, `fastest`, `change` and `velocity` are the addresses of arrays (n,), which the caller keeps alive: limits of the
-    positions, largest velocities, largest changes of the velocity in a tick, and commanded velocities. `count`: n. `dt`: duration of a
+    `count`: n. `lower`, `upper`: limits of the positions. `fastest`: largest velocities. `change`: largest changes of the velocity in a
+    tick. `velocity`: commanded velocities. These five are addresses of arrays (n,), which the caller keeps alive. `dt`: duration of a
     tick [s].
     """
 

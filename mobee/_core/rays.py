@@ -76,8 +76,8 @@ class _Light(ctypes.Structure):
 class Chosen:
     """K chosen pixels of a picture (H, W), numbered row by row.
 
-    `before` (H, W + 1): the number of chosen pixels before each pixel, and before the end of each row.  `columns` (K + 3,): the column of
-    each chosen pixel, then three zeros that belong to no pixel.
+    `before` (H, W + 1): before[i, j] is the number of chosen pixels in all rows above row i, and in the first j columns of row i.
+    `columns` (K + 3,): the column of each chosen pixel, then three zeros that belong to no pixel.
     """
 
     before: NDArray[np.int32]
@@ -101,8 +101,8 @@ class Chosen:
 class Lamp:
     """A lamp far away, in the direction `towards` (3,), a unit vector in the root frame.
 
-    `ambient`: brightness, as a factor on the colour, of a surface that is turned away from the lamp; `diffuse`: what is added to it for a
-    surface that faces the lamp.  `nothing`: red, green and blue, 0 to 255, of a pixel that shows neither volume nor surface.
+    `ambient`: factor on the colour of a surface that is turned away from the lamp. `ambient` + `diffuse`: the factor if the surface faces
+    the lamp. `nothing`: red, green and blue, 0 to 255, of a pixel that shows neither volume nor surface.
     """
 
     towards: tuple[float, float, float]
@@ -117,7 +117,8 @@ class Rays:
 
     The ray of column i and row j passes through the point x = left + i step, y = top + j step of the plane 1 m ahead of `origin` (3,) m.
     `axes` (3, 3): the rows are the directions right (x), down (y) and ahead of the camera, in the root frame.  `perspective`: True: all
-    rays begin at `origin`; False: all rays are parallel to ahead, and x and y are in m.  A surface nearer than `nearest` m is not drawn.
+    rays begin at `origin`; False: each ray begins at its point x, y [m] of the plane through `origin`, in the direction ahead.  A surface
+    nearer than `nearest` m is not drawn.
     """
 
     axes: Array
@@ -143,8 +144,8 @@ def cast(
     """Find the first volume or surface that each ray hits; return three arrays: depths, indices and normals.
 
     `volumes`: (N,) rows of CONVEX. `surfaces`: (M,) rows of SURFACE. Depths (H, W) m are along the axis ahead, infinite if the ray hits
-    nothing. Indices (H, W) are those of volumes, or the numbers of surfaces, -1 for nothing. Normals (H, W, 3) point outward, root frame.
-    With K `chosen` pixels only their rays are computed, and the shapes are (K,), (K,) and (K, 3).
+    nothing. Indices (H, W): the row of a volume in `volumes`, or the field "number" of a surface; -1: nothing. Normals (H, W, 3) point
+    outward, root frame. With K `chosen` pixels only their rays are computed, and the shapes are (K,), (K,) and (K, 3).
     """
     for table, row, size in ((volumes, CONVEX, _convex_size()), (surfaces, SURFACE, _surface_size())):
         if table.dtype != row or row.itemsize != size:
@@ -163,11 +164,11 @@ def cast(
 
 
 def shade(which: NDArray[np.int32], normal: Floats, pixels: NDArray[np.int64], colors: Floats, lamp: Lamp, brightness: Floats) -> None:
-    """Add the colour of what a ray hits, as the lamp lights it, to the brightness of each of K pixels, in place.
+    """Compute the colour of each of K pixels in the light of the lamp, and add it to the `brightness` of the pixel, in place.
 
-    `brightness` (K, 3): red, green and blue, 0 to 255. `which` (R,) and `normal` (R, 3): of R rays, the index of the volume or surface
-    that is hit, and its normal, as `cast` returns them. `pixels` (K,): index of the ray of each pixel. `colors` (N, 3): red, green and
-    blue, 0 to 255, of each index in `which`.
+    `brightness` (K, 3): red, green and blue; 0 to 255 is added. `which` (R,) and `normal` (R, 3): of R rays, the index of the volume or
+    surface that is hit, and its normal, as `cast` returns them. `pixels` (K,): index of the ray of each pixel. `colors` (N, 3): row k is
+    the red, green and blue, 0 to 255, of the volume or surface with the index k.
     """
     arrays = (address(array) for array in (which, normal, pixels, colors, brightness))
     towards, nothing = (REAL * 3)(*(float(np.float32(one)) for one in lamp.towards)), (ctypes.c_float * 3)(*lamp.nothing)

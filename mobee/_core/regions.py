@@ -45,8 +45,8 @@ def regions(likeness: NDArray[np.float32], least: float, around: int) -> list[Re
     Args:
         likeness: how much of the colour is in each pixel (H, W), proportional to the share of the pixel that has the colour; 0: none.
         least: smallest area of a region, in pixels.
-        around: side, in pixels (odd), of a square around each pixel. The largest likeness in the square, at least 1, is taken as that of a
-            pixel that is completely of the colour; the share of the middle pixel is its likeness divided by this value.
+        around: side, in pixels (odd), of a square around each pixel. The share of this pixel that has the colour is estimated: its
+            likeness, divided by the largest likeness in the square or by 1, whichever is larger.
     """
     likeness = np.ascontiguousarray(likeness, dtype=np.float32)
     smallest = max(1, int(np.ceil(least)))

@@ -93,8 +93,9 @@ class Silhouette:
         Args:
             position: position of the shape's middle, (3,) m, root frame.
             turn: rotation of the shape's axes, (3, 3), root frame.
-            touching: the points (K, 3) m of the shape that are farthest along the K normals, relative to its middle, in the camera's axes,
-                and the coordinates (K,) of their images along the normals.
+            touching: for each of the K `normals` of this object, the point of the shape whose image is farthest along the normal. First
+                these points (K, 3) m, relative to the shape's middle, in the camera's axes; then the coordinates (K,) of their images along
+                the normals.
             errors: (e,) estimated errors, in standard deviations: noise and bias of the cameras, three shifts of the outline in each
                 picture (along column and row, and outwards), and two of the outlines in all pictures.
         """

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Gaze: neck and eyes keep a place in the middle of the pictures of all cameras.
 
-Motors that move cameras but no shapes (the eyes) point the cameras at the target. Their goal is computed for the posture that all other
-motors will have after the delay of the motors, so that the eyes also compensate the motion of neck and torso (the vestibulo-ocular reflex).
-The other motors of the part that move cameras (the neck) move to the posture in which the eyes are in the middle of their range. A
-`Reference` (a speed-limited trajectory) moves both to their goals: at full speed while the target is far from the middle of the pictures (a
-saccade), and with the target's own velocity near it (smooth pursuit).
+The eyes are the part's motors that move cameras but none of the robot's shapes, the volumes that are tested for contacts. They point the
+cameras at the target. Their goal is computed for the posture that all other motors will have after the delay of the motors, so that the
+eyes also compensate the motion of neck and torso (the vestibulo-ocular reflex). The neck is the part's other motors that move cameras; they
+move to the posture in which the eyes are in the middle of their range. A `Reference` (a speed-limited trajectory) moves both to their
+goals: at full speed while the target is far from the middle of the pictures (a saccade), and with the target's own velocity near it (smooth
+pursuit).
 """
 
 from __future__ import annotations
@@ -39,8 +40,9 @@ FAR = 2.0  # m
 class Movement:
     """How a part should move at present, in the form that `Controller.follow` needs.
 
-    `q`: (n_part,) rad, positions. `velocity`: (n_part,) rad/s. `phase`: "saccade" (fast motion to a far target) or "pursuit" (motion with a
-    near target). `error`: present angle between a camera's direction of view and the target, the largest of all cameras [rad].
+    `q`: (n_part,) rad, positions. `velocity`: (n_part,) rad/s. `phase`: "saccade" (fast motion to a target far from the middle of the
+    pictures) or "pursuit" (motion with a target near the middle). `error`: present angle between a camera's direction of view and the
+    target, the largest of all cameras [rad].
     """
 
     q: Array
@@ -200,9 +202,9 @@ class Gaze:
 def gaze_motors(robot: Robot, part: str, links: Iterable[int], movable: NDArray[np.bool_] | None = None) -> tuple[Ints, Ints]:
     """Return the indices of the motors of a part that move at least one of the links: the eyes and the neck.
 
-    The first array has the indices of the motors that move no shape (the eyes), the second those of all others (the neck). `links`: indices
-    of the links that carry cameras. `movable`: (n,) whether each motor may be moved; None: all. Raises InvalidValue if there are no such
-    motors, and UnknownName for an unknown part.
+    The first array has the eyes: the motors that move none of the robot's shapes, the volumes that are tested for contacts. The second has
+    all others (the neck). `links`: indices of the links that carry cameras. `movable`: (n,) whether each motor may be moved; None: all.
+    Raises InvalidValue if there are no such motors, and UnknownName for an unknown part.
     """
     span, matrix, ancestry = robot.part(part).slice, robot.coupling[0], tables(robot).ancestry
     turning, bodies = (np.zeros(len(robot.motors), dtype=bool) for _ in range(2))

@@ -34,8 +34,8 @@ class Grip:
         along: distance from the palm's marker to the thing's axis, along the fingers [m].
         gap: distance between palm and thing when the hand closes [m].
         before: distance between palm and thing at the pre-grasp, the pose before the hand moves to the thing [m].
-        height: height of the palm above the ground on which the thing stands [m]; at this height the ground does not touch the fields of
-            hand and forearm (volumes that cause repulsive forces).
+        height: height of the palm above the ground on which the thing stands [m]. At this height the ground does not touch the fields,
+            volumes that cause repulsive forces, of hand and forearm.
         oppose: rad, opposition of the thumb.
         spread: rad, spread of the fingers.
         fingers: share by which the fingers close, 0 open to 1 closed.
@@ -58,7 +58,8 @@ class Grip:
 class Palm:
     """A pose of a palm in the root frame.
 
-    `position`: (3,) m. `rotation`: (3, 3), columns along the fingers, away from the thumb, and the normal.
+    `position`: (3,) m. `rotation`: (3, 3), whose columns are unit vectors: the direction along the fingers, the direction away from the
+    thumb, and the normal of the palm.
     """
 
     position: Array
@@ -166,7 +167,7 @@ class SideGrasp:
     def attractor(self, q: Array) -> Array:
         """Return the attractor (n,) rad with which the robot rests at q (n,) rad.
 
-        The spring between the attractor and q cancels the control law's forces there (`forces`).
+        At q, the control law's spring force towards this attractor cancels the forces that `forces` returns.
         """
         return attractor_for(self.model.robot, self.gains, q, -self.forces(q))
 

@@ -215,10 +215,11 @@ class Picker:
         return aim
 
     def move(self, path: Array, speed: float, watch: BumpWatch | None = None) -> bool:
-        """Move along a path (K, n) rad, with an attractor that cancels the control law's forces; return whether a bump was detected.
+        """Move along a path (K, n) rad; return whether a bump was detected.
 
-        `speed`: share of the largest speed. `watch`: detects bumps; at a bump the robot moves back a little and the motion ends; None:
-        bumps are not detected.
+        The attractor is shifted from the path such that its spring cancels the forces that `SideGrasp.forces` returns. `speed`: share of
+        the largest speed. `watch`: detects bumps; at a bump the robot moves back a little and the motion ends; None: bumps are not
+        detected.
         """
         return self.body.follow_path(path, speed, watch, self.grasp.forces).bumped
 
@@ -281,8 +282,8 @@ class Picker:
             centre: (3,) m, root frame, where the cameras see the centre of the thing now; None: it has not slipped in the hand.
 
         Raises:
-            NoPosture: the thing could not be put down at any place.  Then the hand has put it back where it was lifted, or still holds it
-                after another bump.
+            NoPosture: the thing could not be put down at any place. Then the hand has put it back where it was lifted, or, if there
+                was a bump on this motion too, still holds it.
         """
         slipped = np.zeros(3) if centre is None else self.slipped(thing, centre)
         held = self._model_with(thing, slipped)

@@ -137,7 +137,7 @@ class MapPlanner:
 def near_any(palms: Array, blocked: Array) -> NDArray[np.bool_]:
     """Return for each of the palm positions (P, 3) m whether it is near one of the blocked positions (B, 3) m: booleans (P,).
 
-    Near means within 5 cm horizontally, and lower than 6.5 cm above the blocked position.
+    A palm is near a blocked position if their horizontal distance is at most 5 cm and the palm is less than 6.5 cm higher, or lower.
     """
     beside = np.linalg.norm(palms[:, None, :2] - blocked[:, :2], axis=2) <= AROUND
     found: NDArray[np.bool_] = (beside & (palms[:, None, 2] < blocked[:, 2] + OVER)).any(axis=1)

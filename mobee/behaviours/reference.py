@@ -17,7 +17,7 @@ LEASH = np.deg2rad(15.0)  # rad by which the reference may be ahead of its motor
 class Reference:
     """The reference trajectory of m motors, which moves towards a moving goal within the limits of speed and acceleration.
 
-    `q`: (m,) rad, its present position. `velocity`: (m,) rad/s.
+    `q`, `velocity`: (m,) rad and (m,) rad/s, present position and velocity on the trajectory.
     """
 
     def __init__(self, robot: Robot, where: slice, q: Array, low: Array, high: Array, speed: float = SPEED) -> None:

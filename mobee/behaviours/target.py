@@ -16,7 +16,10 @@ JUMP = 0.05  # m from where the target was expected: it has jumped, and older pl
 
 
 class TargetTrack:
-    """Estimates the motion of a target that moves at a constant velocity, or jumps; all times are in s of one clock, of any origin."""
+    """Estimates the motion of a target that moves at a constant velocity, or jumps.
+
+    All times [s] are those of one clock; the zero of this clock is arbitrary.
+    """
 
     def __init__(self, patience: float = 0.6) -> None:
         """Make a track; `patience`: time after the last seen place for which the motion is extrapolated [s]."""

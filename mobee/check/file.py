@@ -135,7 +135,10 @@ def _require_known(name_or_path: str | Path) -> None:
 
 
 def world_file(name_or_path: str | Path) -> Path | None:
-    """Return the path of a world file, given its path or the name of a shipped world; None for a robot, and if there is no such file."""
+    """Return the path of a world file, given its path or the name of a shipped world.
+
+    None if the argument is the name or file of a robot, or if there is no such XML file.
+    """
     given, path = str(name_or_path), Path(name_or_path)
     if given in shipped_worlds() and given not in shipped_robots():
         return WORLDS / f"{given}.xml"

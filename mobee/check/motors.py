@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks the joints, motors, markers and home of a robot: limits, couplings, motors without effect, homes in limit zones."""
+"""Checks the joints, motors, markers and home of a robot: limits, couplings, motors without effect, homes too near to limits."""
 
 from __future__ import annotations
 

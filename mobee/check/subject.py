@@ -33,7 +33,10 @@ class Subject:
         self.world = world
 
     def where(self, kind: str, name: str) -> str:
-        """Return "file:line" of an element, such as kind "joint" and its name; that of the robot if the element's line is not known."""
+        """Return the place "file:line" of an element, given its kind (such as "joint") and its name.
+
+        If the line of the element is not known, return the place of the robot; if that is not known either, the robot's name.
+        """
         return self.robot.where.get((kind, name)) or self.robot.where.get(("robot", self.robot.name)) or self.robot.name
 
     @property
@@ -49,7 +52,8 @@ class Subject:
     def urdf_link(self, shape: str) -> str | None:
         """Return the name of the link of a shape in the URDF file, before links of fixed joints are merged.
 
-        `shape`: name of the shape. Returns None for another kind of file, and if shapes of several links begin in the same line.
+        `shape`: name of the shape. The link is found by the line number of the shape. So None is returned if several links are in this line
+        of the file, and for a file that is not a URDF.
         """
         return self._urdf_links.get(self.where("shape", shape))
 
@@ -83,7 +87,7 @@ class Subject:
 
     @cached_property
     def limited(self) -> Robot:
-        """The robot with finite limits for all motors, which a model needs: `range` replaces the limits of the file."""
+        """The robot with finite limits for all motors, from which the checks make their models: `range` replaces the limits of the file."""
         motors = zip(self.robot.motor_table, self.range, strict=True)
         return replace(self.robot, motor_table=tuple(replace(motor, limits=limits) for motor, limits in motors))
 
@@ -105,10 +109,10 @@ class Subject:
 
     @cached_property
     def foreign(self) -> tuple[tuple[Shape, Shape, float], ...]:
-        """The fields that overlap a solid of another part at home, where no field of the solid's link touches them.
+        """The fields that overlap a solid of another part at home without a repulsive force, each as (field, solid, depth [m]).
 
-        Each is given as (field, solid, depth [m]). A repulsive force needs two fields that overlap, so no force keeps the field's part away
-        from the solid.
+        Fields are volumes around solids. A force acts only between two fields that overlap, and these fields have no contact with a field
+        of the solid's link. So no force keeps the field's part away from the solid.
         """
         robot, shapes = self.limited, self.robot.shapes
         tested = {frozenset((shapes[i].link, shapes[j].link)) for i, j in robot.solid_pairs}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The MoBeE controller: a dynamical system that an attractor pulls and forces constrain (thesis 5.2)."""
+"""The MoBeE controller: a dynamical system for the motor positions, with an attractor and constraint forces (thesis 5.2)."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ class Controller:
     def attractor(self) -> Array:
         """The position q* that attracts the motors, shape (n,), in [rad]; a copy.
 
-        Assign an array to set it; the attractor then does not move.
+        Assign an array to set it. This also ends the effect of `follow`: the new attractor does not move.
         """
         return self._attractor.copy()
 
@@ -152,7 +152,7 @@ class Controller:
 
     @property
     def pushed(self) -> bool:
-        """Whether a force given to `push` acts on a marker; its projection to the motors depends on the pose."""
+        """Whether a force given to `push` acts on a marker. Each step projects it to the motors again, since this depends on the pose."""
         return bool(self._pushes)
 
     @property
@@ -182,10 +182,11 @@ class Controller:
     def follow(self, part: str, q: Array, velocity: Array) -> None:
         """Set the attractor of one part to a goal that moves with a known velocity.
 
-        The damping of eq. 5.7 then acts on the velocity relative to the goal, C (q' - q*'), so that the part follows without a lag. If
-        other forces push a motor against the goal's velocity, the motor follows less; if they are 0.25 rad/s^2 or more, only the spring of
-        the attractor pulls the motor. Call this at least every FOLLOW_TIME (0.1 s of the control law's time); later the goal counts as not
-        moving. Raises UnknownName for an unknown part, InvalidValue for a wrong shape or numbers that are not finite.
+        The damping of eq. 5.7 then acts on the velocity relative to the goal, C (q' - q*'), so that the part follows without a lag. If the
+        sum of all other forces on a motor opposes the goal's velocity q*', only a fraction of q*' is used; it decreases linearly with the
+        force and is 0 from 0.25 rad/s^2 on, so that the motor then moves as for a goal at rest. Call this at least every FOLLOW_TIME (0.1 s
+        of the control law's time); later the goal counts as not moving. Raises UnknownName for an unknown part, InvalidValue for a wrong
+        shape or numbers that are not finite.
 
         Args:
             part: name of the part.
@@ -209,9 +210,9 @@ class Controller:
     def push(self, marker: str, f: Array) -> None:
         """Apply a client's force to a marker until the next call for this marker, or `clear` (thesis eq. 5.10).
 
-        `f`: force (3,), or force and moment (6,), in the root frame, per unit mass: J^T f is in rad/s^2, and is then bounded. Raises
-        UnknownName for an unknown marker, and InvalidValue for a wrong shape, or for numbers that are not finite or above LARGEST_FORCE
-        (1e9) in size.
+        `f`: force (3,), or force and moment (6,), in the root frame. It is given per unit mass, so that J^T f is the acceleration of the
+        motors in rad/s^2, before it is bounded (thesis eq. 5.8). Raises UnknownName for an unknown marker, and InvalidValue for a wrong
+        shape, or for numbers that are not finite or above LARGEST_FORCE (1e9) in size.
         """
         self.robot.marker(marker)
         self._pushes[marker] = checked_force(f"push on {marker}", f, 6 if len(np.atleast_1d(f)) == 6 else 3)
@@ -283,8 +284,9 @@ class Controller:
     def own_forces(self, q: Array, dt: float, pose: Pose | None = None, reaching: Reaching = None) -> dict[str, Array]:
         """Return a dict from the name of each user-defined term to its force, (n,) rad/s^2, at the measured q (n,) rad in a tick of dt [s].
 
-        `pose`: the robot at q; None: evaluated when a term reads it. `reaching`: the markers that reach in this pose; contacts of their
-        hands with targets are ignored. Raises InvalidValue, with the name of the term, if a term fails.
+        `pose`: the robot at q; None: evaluated when a term reads it. `reaching`: names of the markers that reach for a target. If the pose
+        is evaluated here, contacts of the hands of these markers with targets are ignored. Raises InvalidValue, with the name of the term,
+        if a term fails.
         """
         if not self.terms:
             return {}

@@ -33,8 +33,8 @@ class Forces(Mapping[str, Array]):
 
     First are the forces of the control law, in the order in which they are added: `limits`, `constraints` and `collision`, which are f_lim,
     f_cst and f_coll of thesis eq. 5.7. Then come the forces of user-defined terms. A force can also be read as an attribute:
-    `forces.limits`. The forces `limits`, `constraints` and `collision` depend only on the pose. A core that somebody has extended may have
-    more forces, which depend on the state of the law, such as its velocity; an object may be made without these.
+    `forces.limits`. The forces `limits`, `constraints` and `collision` depend only on the pose. The control law has more forces if they
+    were added to the compiled core. Those that depend on the state of the law, such as its velocity, need not be given to the constructor.
     """
 
     __slots__ = ("_rows",)
@@ -89,9 +89,9 @@ def published_terms() -> tuple[str, ...]:
 
 
 def needs_contacts() -> bool:
-    """Return whether some forces of the control law depend on the law's state, such as its velocity.
+    """Return whether some forces of the control law depend on the law's state, such as its velocity, and not on the pose only.
 
-    In the live system the model service then publishes all contacts too, so that the controller service can compute such forces.
+    If so, the controller service of the live system computes these forces, and the model service also publishes all contacts for this.
     """
     return bool(state_term_names())
 
@@ -99,8 +99,8 @@ def needs_contacts() -> bool:
 def constraint_forces(pose: Pose, gains: Gains, propagate: Propagate = "tree", contact_forces: bool = True) -> Forces:
     """Return the constraint forces at one pose (thesis eqs. 5.11 to 5.17); raises InvalidValue for a batch of poses.
 
-    `propagate`: "tree": a contact acts on all motors down to the base; "part": on the motors of its part only. `contact_forces` False:
-    f_coll is 0, for experiments in which contacts have no effect.
+    `propagate`: the motors on which a contact of a link acts: "tree": all motors from the link down to the base; "part": only those of the
+    part that the link belongs to. `contact_forces` False: f_coll is 0, for experiments in which contacts have no effect.
     """
     return forces_of(_law(pose.robot, gains, contact_forces), pose, propagate)
 
@@ -108,9 +108,9 @@ def constraint_forces(pose: Pose, gains: Gains, propagate: Propagate = "tree", c
 def forces_of(law: Law, pose: Pose, propagate: Propagate, state: Table | None = None) -> Forces:
     """Return the constraint forces of a law at one pose.
 
-    `propagate`: "tree": a contact acts on all motors down to the base; "part": on the motors of its part only. `state`: the state of the
-    law, with the columns of `mobee._core.law.STATE`; None: at rest. Raises InvalidValue for a batch of poses, and UnknownName for another
-    value of `propagate`.
+    `propagate`: the motors on which a contact of a link acts: "tree": all motors from the link down to the base; "part": only those of the
+    part that the link belongs to. `state`: the state of the law, with the columns of `mobee._core.law.STATE`; None: at rest. Raises
+    InvalidValue for a batch of poses, and UnknownName for another value of `propagate`.
     """
     if pose.q.ndim != 1:
         raise InvalidValue(f"a batch of poses, of shape {pose.q.shape}: forces belong to one pose")

@@ -37,8 +37,8 @@ class Settle:
 
     A part has settled when the commanded speed and acceleration of all its motors are at most `speed` [rad/s] and `acceleration` [rad/s^2].
     The test is made `first_check` s after the start of the action and then every `interval` s; after `timeout` s the action ends without
-    having settled. For a motor that slides, 1 rad stands for a fraction of its range (`mobee.robot.motor_units.fine_units`): a `speed` of 3
-    deg/s is then 0.4 % of the range per second.
+    having settled. For a motor that slides, 1 rad stands for 7.2 % of the motor's range (`mobee.robot.motor_units.fine_units`): a `speed`
+    of 3 deg/s is then 0.4 % of the range per second.
     """
 
     speed: float
@@ -60,11 +60,12 @@ class Gains:
     """The numbers of the control law of thesis eq. 5.7, and the variant of the law.
 
     The mass is 1, so a force is an acceleration in rad/s^2. All numbers are for motors that turn. For a motor that slides, 1 rad stands for
-    a fraction of its range (`mobee.robot.motor_units`): a `limit_width` of 10 degrees is 5 % of the range, a force of 12 rad/s^2 is 3.4
+    29 % of the motor's range (`mobee.robot.motor_units`): a `limit_width` of 10 degrees is 5 % of the range, a force of 12 rad/s^2 is 3.4
     ranges/s^2. Gains can be stored as JSON: write `dataclasses.asdict(gains)`, and make `Gains(**read)` from what was read.
 
     A clause is a constraint on several joints: a.q + b > 0 must hold for at least one of its rows (`mobee.robot.robot.Clause`). The lever
-    of a contact is the change of its depth if the motors move by 1 rad.
+    of a contact is the change of its depth if the motors move by 1 rad. A client is the program that uses the controller; its forces are
+    those given to `Controller.force` and `Controller.push`.
 
     Attributes:
         law: the variant of the law, which decides how constraints and contacts become forces (see `mobee.reference.forces`).
@@ -133,14 +134,14 @@ class Gains:
     def default(cls) -> Gains:
         """Return the default gains: the equations of the thesis with our own tuning.
 
-        A field is a shape around a link; its contacts cause repulsive forces. With these gains fields overlap, but the solids inside do not
-        touch.
+        A field is a shape around the solids of a link; two fields that overlap repel each other. With these gains fields
+        can be pressed into each other, but their forces stop the links before the solids touch.
 
         The time constant C/K is 0.32 s. The experiment `gain-tuning` chose the numbers, with simulated motors that have lag and delay, and
         commands up to three ticks old at 100 Hz. With a stiffer contact the robot begins to oscillate; with stronger springs of the
         attractor its links pass through the fields. The springs of torso and shoulders are weaker, because many motors push a hand
-        together. The bound of the contact force is a little above the sum of the springs of an arm, so that a contact is stiff even at the
-        border of a field.
+        together. The bound of the contact force is a little above the sum of the springs of an arm. So the force can rise steeply with the
+        depth of a contact, but cannot grow without limit.
         """
         return cls(
             law="default",
@@ -164,7 +165,8 @@ class Gains:
     def published_2014(cls) -> Gains:
         """Return the gains of the 2014 program, converted from degrees. They are needed to reproduce the published findings.
 
-        Fingers and eyes do not move. Obstacles penetrate the fields (shapes around the links that cause repulsive forces) by centimetres.
+        With these gains the fingers and eyes do not move, because their weight is 0. Obstacles come several centimetres deep into the
+        fields, the shapes around the links that cause repulsive forces.
         """
         return cls(
             law="published_2014",
@@ -192,7 +194,8 @@ class Gains:
         A field is a shape around a link; its contacts cause repulsive forces. The lever of a contact is the change of its depth if the
         motors move by 1 rad. For such robots the force is divided by the squared lever, so that contacts have the same stiffness for all
         levers well above `Robot.least_lever`: contact_gain * LEVER^2 = 450 1/s^2 (LEVER: 0.5 m). The bound of the default gains is tuned
-        for the wide fields of the iCub; with it, strong springs would press the fields of such a robot's links into each other.
+        for the wide fields of the iCub. With that bound, on the robots described here, strong springs of the attractor would press
+        the fields of two links into each other.
         """
         return replace(cls.default(), max_contact=50.0)
 
@@ -208,16 +211,17 @@ class Gains:
         """Return gains with other values for the motors that match a pattern, for example `gains.with_motors("*_elbow", stiffness=50.0)`.
 
         If several calls match a motor, the last call counts. Values are in the unit of the motor: for a motor that slides, `limit_width` is
-        in m and each `max_` in m/s^2; its other gains still depend on its range. These gains can be set for single motors: damping,
-        stiffness, max_spring, limit_width, max_limit, client_slope, max_client and weight. Clauses and contacts involve several motors and
-        have one set of gains.
+        in m and each `max_` in m/s^2. (Such gains that are not changed here are converted from rad to m by the range of the motor.) These
+        gains can be set for single motors: damping, stiffness, max_spring, limit_width, max_limit, client_slope, max_client and weight.
+        Clauses and contacts involve several motors and have one set of gains.
         """
         return replace(self, motors=((pattern, tuple(sorted(gains.items()))), *self.motors))
 
     def of_motors(self, name: str, motors: tuple[str, ...]) -> Array:
-        """Return the gain `name` of each motor, (n,), as it was given; numbers in rad are not converted to m for motors that slide.
+        """Return the gain `name` of each motor, (n,), without conversion of units.
 
-        `motors`: the names of the motors. Raises UnknownName if a pattern that was given to `with_motors` matches none of them.
+        For a motor that slides, a gain in units of rad is not converted to m here; `of_robot` does this. `motors`: the names of the motors.
+        Raises UnknownName if a pattern that was given to `with_motors` matches none of them.
         """
         for pattern, _ in self.motors:
             if not any(fnmatchcase(m, pattern) for m in motors):
@@ -270,10 +274,10 @@ class SettleTest:
         self._check = core.calls().settle_check
 
     def update(self, t: float, speeds: Array, accelerations: Array) -> Verdict:
-        """Return "moving", "settled" or "timeout" for the part's motion at time t [s]; between two checks always "moving".
+        """Return "settled" if a check is due at time t [s] and the part is slow, "timeout" if the time is over, else "moving".
 
-        `speeds` (n_part,) rad/s and `accelerations` (n_part,) rad/s^2: commanded motion of the part's motors; the values of motors that
-        slide must be divided by their `mobee.robot.motor_units.fine_units`.
+        `speeds` (n_part,) rad/s and `accelerations` (n_part,) rad/s^2: commanded motion of the part's motors. For a motor that slides, give
+        its speed in m/s and its acceleration in m/s^2, divided by its `mobee.robot.motor_units.fine_units`.
         """
         motion = np.array([speeds, accelerations], dtype=np.float64)
         verdict: int = self._check(ctypes.byref(self._thresholds), ctypes.byref(self._memory), t, motion.tobytes(), motion.shape[1])

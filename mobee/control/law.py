@@ -71,9 +71,9 @@ class Law:
     def forces(self, q: Array, torque: Array, state: Table | None = None) -> Array:
         """Return the constraint forces at q (n,) rad, thesis eqs. 5.11 to 5.17: (3, n) rad/s^2, rows f_lim, f_cst and f_coll.
 
-        A core that somebody has extended has more rows, in the order of `mobee._core.law.term_names()`.
+        If more forces were added to the compiled core, there are more rows, in the order of `mobee._core.law.term_names()`.
 
-        `torque` (n,): the sum over all contacts of J^T times depth times normal, m^2/rad, from `Pose.projection` or
+        `torque` (n,): the sum over all contacts of fields of J^T (depth * normal), m^2/rad, from `Pose.projection` or
         `Pose.projection_of_part`. `state`: the state of the control law before the step; None: at rest.
         """
         found = np.empty((len(core.term_names()), len(self)))
@@ -89,7 +89,10 @@ class Law:
         return state
 
     def add_client(self, f: Array, total: Array) -> None:
-        """Bound a client's force `f` (thesis eqs. 5.8 to 5.10) and add it to `total`, in place; both (n,) rad/s^2."""
+        """Bound a force `f` by thesis eqs. 5.8 to 5.10 and add it to `total`, in place; both (n,) rad/s^2.
+
+        `f` is the force of a client, that is, of the program that uses the controller (see `Controller.force`).
+        """
         self._core.client(self.address, numbers(f, len(self)), address(total))
 
     def step(self, q: Array, dt: float, attractor: Array, force: Array, state: Table) -> Array:
@@ -140,10 +143,11 @@ def _clauses(clauses: Sequence[Clause], gains: Gains, units: Array) -> tuple[Tab
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ClauseRows:
-    """The rows a.q + b > 0 of all clauses of a robot (`mobee.robot.robot.Clause`: conditions on motor positions), one below the other.
+    """The rows of all clauses of a robot, stacked as matrices.
 
-    `a` (rows, n) and `b` (rows,) rad; `norms` (rows,): |a|; `normals` (rows, n): a / |a|; `clause` (rows,): index of the clause of each
-    row; `starts` (clauses,): index of the first row of each clause.
+    A clause is a condition on motor positions: a.q + b > 0 must hold for at least one of its rows (`mobee.robot.robot.Clause`). `a` (rows,
+    n) and `b` (rows,) rad; `norms` (rows,): |a|; `normals` (rows, n): a / |a|; `clause` (rows,): index of the clause of each row; `starts`
+    (clauses,): index of the first row of each clause.
     """
 
     a: Array

@@ -25,8 +25,8 @@ MIN_STIFFNESS = 1e-12  # m^2: of J J^T, for a marker that no motor moves
 class ReachPath:
     """The piecewise linear path that `reach_path` returns.
 
-    `q`: (K, n) rad, the poses from start to end. `end`: why the path ends, "reached", "stuck" or "steps used up". `distance` m and `angle`
-    rad: what remains at the end between marker and target, and between their normals.
+    `q`: (K, n) rad, the poses from start to end. `end`: why the path ends, "reached", "stuck" or "steps used up". `distance`: m, from the
+    marker to the target at the end. `angle`: rad, between the marker's normal and the wanted normal at the end; 0 without a wanted normal.
     """
 
     q: Array
@@ -130,13 +130,13 @@ def marker_error(model: Model, marker: str, target: ReachTarget, q: Array) -> Ma
 
 
 def bend_bound(jacobian: Array, error: Array) -> float:
-    """Return an upper bound on how much the curvature of the marker's path changes the second derivative of |e|^2 / 2 [m^2 per rad^2].
+    """Return an upper bound on the curvature term in the second derivative of |e|^2 / 2, where e is the marker's error [m^2 per rad^2].
 
-    e is the error. Along a unit vector v (n,) of motor motions this second derivative is |J v|^2 - e . x'', where x'' is the second
-    derivative of the marker's position along v; the bound is on |e . x''|, for all v. For a joint i nearer to the base than a joint j, the
-    second derivative of the position by both is the cross product of the axis of i and the linear column j of J. So the bound is the norm
-    of the position's error times the Frobenius norms of the linear and of the angular rows of J. With a rotation, ARM (0.1 m) times the
-    norm of its error times the squared Frobenius norm of the angular rows is added.
+    Let the motors move along a unit vector v (n,). The second derivative of |e|^2 / 2 is then |J v|^2 - e . x'', where x'' is the second
+    derivative of the marker's position. The result is a bound on the curvature term |e . x''| for all v. For a joint i nearer to the base
+    than a joint j, the second derivative of the position by both is the cross product of the axis of i and the linear column j of J. So the
+    bound is the norm of the position's error times the Frobenius norms of the linear and of the angular rows of J. If `error` has six
+    numbers, a term for the rotation is added: ARM (0.1 m) * norm of the last three numbers * squared Frobenius norm of the angular rows.
 
     Args:
         jacobian: (6, n), the Jacobian J of the marker, linear rows first.

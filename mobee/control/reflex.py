@@ -33,8 +33,8 @@ class ReflexSettings:
         brake: how long the robot brakes before it retraces its poses.
         dead_time: how long the robot waits after retracing, before the pose is checked.
         pace: number of recorded poses that are retraced in each tick.
-        must_be_clear: True: return control to the client only at a pose without violations, and retrace further than a waypoint with
-            violations; False: return control at the first waypoint.
+        must_be_clear: True: return control to the client only at a pose without violations; if a waypoint has a violation, retrace
+            further. False: return control at the first waypoint.
     """
 
     history: float = 30.0
@@ -72,8 +72,8 @@ class Violation:
     """One reason why a pose is not safe: a contact, a motor beyond its limit, or a clause (a constraint on several joints) that is broken.
 
     `kind`: "contact", "limit" or "clause". `what`: names of the two volumes of a contact ("first - second"), name of the motor, or part and
-    index of the clause. `depth`: depth of a contact in m; distance beyond a limit in rad (m for a motor that slides); for a clause, of
-    which one row a.q + b > 0 must hold, the distance in rad to the nearest position at which a row holds.
+    index of the clause. `depth`: depth of a contact in m; distance beyond a limit in rad (m for a motor that slides); for a clause, the
+    distance in rad to the nearest position that satisfies it. A clause is satisfied if a.q + b > 0 holds for at least one of its rows.
     """
 
     kind: Literal["contact", "limit", "clause"]
@@ -157,7 +157,7 @@ class Counts:
 class Debounce:
     """A filter for a signal that is True or False: its output changes after the input has differed from it for some consecutive ticks.
 
-    It is used as in thesis 4.4. `on`: the present output.
+    The reflex filters its violations by it (thesis 4.4). `on`: the present output.
     """
 
     def __init__(self, confirm: int, release: int) -> None:
@@ -178,10 +178,11 @@ class Reflex:
     """A state machine that decides in each tick what commands the robot: the client, or the reflex, which retraces recent poses.
 
     State "forward": the client commands, and poses are recorded; a confirmed violation changes to "brake". State "brake": the robot stops;
-    the time `brake` later, the state changes to "rewind". State "rewind": the target moves back along the recorded poses, to a waypoint (a
-    pose that counts as safe, see `mark`) or to the oldest pose; then the state changes to "dead". State "dead": the robot waits for the
-    time `dead_time`. Then, if the pose is without violation or need not be (`must_be_clear`), the state changes to "forward"; otherwise to
-    "rewind", or to "stuck" if no recorded pose is left. State "stuck" ends when the pose is without violation, or by `accept`.
+    after the time `brake` of the settings, the state changes to "rewind". State "rewind": the target moves back along the recorded poses,
+    to a waypoint (a pose that counts as safe, see `mark`) or to the oldest pose; then the state changes to "dead". State "dead": the robot
+    waits for the time `dead_time`. Then, if the pose has no violation, or if the setting `must_be_clear` is False, the state changes to
+    "forward"; otherwise to "rewind", or to "stuck" if no recorded pose is left. State "stuck" ends when the pose has no violation, or by
+    `accept`.
     """
 
     def __init__(self, settings: ReflexSettings, dt: float, max_velocity: Array) -> None:

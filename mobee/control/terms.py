@@ -23,8 +23,8 @@ _NAME = re.compile("[a-z][a-z0-9_]{0,63}")
 class State:
     """The input of the function of a user-defined force in one tick; arrays are read-only.
 
-    `q`: (n,) rad, measured positions. `velocity`: (n,) rad/s, of the control law's own state, not measured. `dt`: s, duration of the tick.
-    `robot`: the robot. `pose`: the robot at q in its world.
+    `q`: (n,) rad, measured positions. `velocity`: (n,) rad/s, the velocity that the control law has computed; it is not measured. `dt`: s,
+    duration of the tick. `robot`: the robot. `pose`: the robot at q in its world; `evaluate` returns it and is called at most once.
     """
 
     __slots__ = ("_evaluate", "_pose", "dt", "q", "robot", "velocity")

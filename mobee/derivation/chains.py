@@ -16,10 +16,10 @@ HAND = 0.5  # of the length of a chain: branches at its end that are all shorter
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Chain:
-    """An arm: a chain of joints from the last branching of the tree to its end.
+    """An arm or leg: a chain of joints from the base, or a branching of the tree, to a hand or to a link without further joints.
 
-    `joints`: indices, the joint nearest to the base first. `end`: index of the link at the end. `hand`: indices of the joints of the
-    fingers, which the end carries.
+    `joints`: indices, the joint nearest to the base first. `end`: index of the last link of the chain. `hand`: indices of all joints that
+    this link carries, those of the fingers; empty if there is no hand.
     """
 
     joints: tuple[int, ...]
@@ -30,10 +30,11 @@ class Chain:
 def chains(robot: Robot) -> list[Chain]:
     """Return the chains of joints that can be arms or legs, in the order of the tree.
 
-    A chain ends at a link without further joints, or at a hand. At a branching, a branch is short if it is shorter [m] than HAND (0.5)
-    times the chain up to there, else long. If all branches are short, they are the fingers of a hand, and the chain ends there. If some
-    are long, the short ones are ignored. If exactly one is long, the chain continues in it (unless the chain has only one joint). Otherwise
-    each long branch begins a new chain, and the joints before the branching are a trunk, which belongs to no chain.
+    A chain ends at a link without further joints, or at a hand. Where the tree branches, a branch is short if its length is less than HAND
+    (0.5) times the length of the chain before it; otherwise it is long. If all branches are short, they are the fingers of a hand, and the
+    chain ends there. If some are long, the short ones are ignored. If exactly one is long, the chain continues in it (unless the chain has
+    only one joint). Otherwise each long branch begins a new chain, and the joints before the branching are a trunk, which belongs to no
+    chain.
     """
     tree = _Tree(robot)
     found: list[Chain] = []
@@ -111,8 +112,8 @@ def corners_of(shape: Shape) -> Array:
 def end_point(robot: Robot, chain: Chain) -> Array:
     """Return the end point of a chain, (3,) m, root frame at zero pose, for measuring how far the joints move the end.
 
-    It is the mean position of the solids of the last link and its hand; without solids, of their markers; without markers, of the joints of
-    the hand, else the last joint of the chain.
+    It is the mean position of the solids of the last link and of its hand. If these links have no solids, it is the mean position of their
+    markers; if they have no markers either, of the joints of the hand. Without a hand it is then the last joint of the chain.
     """
     links = {chain.end, *(joint + 1 for joint in chain.hand)}
     middles = [shape.position for shape in robot.shapes if shape.link in links and shape.role == "solid"]

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Adds motor limits and clauses (conditions on motor positions) that keep solids apart which are too near each other for fields.
+"""Adds motor limits and clauses (conditions on motor positions) to a robot, so that links do not touch.
 
-Whether two links with few joints between them touch depends only on the motors between them.  From the space of these motors, half-spaces
-are cut off until no sampled position is left in which the links touch. A half-space along a single motor becomes a limit of this motor,
-any other a clause (thesis eqs. 5.14 to 5.17).
+They are for pairs of links that fields (volumes that cause repulsive forces) cannot keep apart, for example because the links are too near
+each other. Whether two links touch depends only on the motors of the joints between them. From the space of the positions of these motors,
+half-spaces are cut off until no sampled position is left in which the links touch. A half-space along a single motor becomes a limit of
+this motor, any other a clause (thesis eqs. 5.14 to 5.17).
 """
 
 from __future__ import annotations
@@ -46,10 +47,11 @@ class _Group:
 def with_cuts(robot: Robot, pairs: Ints, seed: int) -> tuple[Robot, tuple[str, ...], Ints]:
     """Add motor limits, and clauses (conditions on several motor positions), that keep pairs of solids from touching.
 
-    Returns the robot with them, the names of the motors whose range is narrower now, and the pairs (r, 2) for which this fails, so that
-    they need fields (volumes that cause repulsive forces): more than MOST_LEFT (20 %) of the sampled positions in which they touch are
-    still allowed. `pairs` (p, 2): indices of shapes. Pairs with more than MOST_MOTORS (3) motors between them, or with motors of several
-    parts between them, are left as they are and not returned. `seed`: seed of the samples.
+    Returns the changed robot, the names of the motors whose range is narrower now, and the pairs (r, 2) for which this fails. Those pairs
+    need fields (volumes that cause repulsive forces), because more than MOST_LEFT (20 %) of the sampled positions in which the solids touch
+    are still allowed. Pairs with the same motors between them are judged together. `pairs` (p, 2): indices of shapes. Pairs with more than
+    MOST_MOTORS (3) motors between them, or with motors of several parts between them, are left as they are and not returned. `seed`: seed
+    of the samples.
     """
     narrowed: dict[int, Array] = {}
     clauses: list[Clause] = []

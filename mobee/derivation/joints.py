@@ -21,10 +21,10 @@ TURN = 2.0 * np.pi
 
 
 def bounded(robot: Robot) -> tuple[Robot, list[str]]:
-    """Limit every motor whose range is a turn or more to half a turn to each side; return the robot and the names of the changed motors.
+    """Limit every motor with a range of a turn or more to half a turn to each side; return the robot and the names of the changed motors.
 
     With a larger range, positions one turn apart are the same pose, so that several states of a lattice would be the same pose. The middle
-    of the new range is 0, or home if home is not within half a turn of 0.
+    of the new range is 0, or home if home is not within half a turn of 0. The new range is then clipped to the old one.
     """
     changed = [motor.name for motor in robot.motor_table if np.ptp(motor.limits) >= TURN - 1e-6 and not slides(robot, motor)]
     table = []

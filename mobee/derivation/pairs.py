@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Finds pairs of links that touch too often to be tested, and a home without contacts; adds fields with their tested pairs."""
+"""Finds pairs of links that touch in most poses, and a home without contacts; adds fields, and the pairs of fields to be tested."""
 
 from __future__ import annotations
 
@@ -106,8 +106,8 @@ def free_home(robot: Robot, seed: int) -> tuple[Array, set[LinkPair]]:
     """Return a home (n,) near the robot's home in which as few solids as possible touch, and the pairs of links that still touch.
 
     Positions are in the units of the motors, rad or m. Pairs of links are sets of two indices. Only the motors between links that touch are
-    moved: to random positions, in a range about the best position so far that grows in each round of the search. `seed`: seed of the random
-    positions.
+    moved, to random positions around the best position so far. The range of these positions grows in each round of the search. `seed`: seed
+    of the random positions.
     """
     solids = replace(robot, field_pairs=robot.field_pairs[:0])
     model, rng = Model(solids), np.random.default_rng(seed)
@@ -168,9 +168,9 @@ def with_fields(robot: Robot, pairs: Ints, width: float, seed: int, short: float
 
     `pairs`: (p, 2) indices of shapes, the pairs of solids that fields should keep apart. `width`: m, distance by which fields extend beyond
     the solids. A pair gets fields of the full width, or else of 1/2, 1/4 or 1/8 of it. A width is not used for a pair whose fields would
-    overlap at home or in more than FIELD_OFTEN (60 %) of random poses. It is also not used if limits and clauses can keep the pair apart,
-    and the median lever of its contacts (the change of the depth if the motors move by 1 rad) is shorter than `short` times the robot's
-    least lever. `seed`: seed of the random poses.
+    overlap at home or in more than FIELD_OFTEN (60 %) of random poses. It is also not used for a pair with short levers, if limits and
+    clauses can keep the pair apart (see `can_cut`). The lever of a contact is the change of its depth if the motors move by 1 rad; levers
+    are short if their median is below `short` times `Robot.least_lever`. `seed`: seed of the random poses.
     """
     for suffix, size in SIZES.items():
         robot, pairs = _with_fields(robot, pairs, size * width, suffix, seed, short)
@@ -178,10 +178,12 @@ def with_fields(robot: Robot, pairs: Ints, width: float, seed: int, short: float
 
 
 def home_apart(robot: Robot, reach: float, seed: int) -> Array:
-    """Return a home (n,) near the robot's home in which no solids touch and fields of half the usual width would not overlap.
+    """Return a home (n,) near the robot's home in which no solids touch, and in which there is room for fields between them.
 
-    Fields are volumes that cause repulsive forces. If no such home is found, the one with the fewest contacts is returned.
-    Positions are in the units of the motors, rad or m. `reach`: m, length of the robot's longest arm. `seed`: seed of the random search.
+    Fields are volumes around solids that cause repulsive forces. There is room if fields of half the width `field_width` would not overlap;
+    pairs whose fields would overlap in more than FIELD_OFTEN (60 %) of random poses are not tested. If no such home is found, the one with
+    the fewest contacts is returned. Positions are in the units of the motors, rad or m. `reach`: m, length of the robot's longest arm.
+    `seed`: seed of the random search.
     """
     width = AT_HOME * field_width(reach)
     needed = sorted(set(robot.solid_pairs.ravel().tolist()))

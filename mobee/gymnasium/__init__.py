@@ -2,8 +2,8 @@
 """MoBeE and Gymnasium: the robot as an environment, and any discrete environment as a plant for the curious agent.
 
 `import mobee.gymnasium` registers the ids `MoBeE/Lattice-v0`, `MoBeE/Reach-v0`, `MoBeE/RiverSwim-v0` and `MoBeE/DeepSea-v0`.
-`gymnasium.make("mobee.gymnasium:MoBeE/Reach-v0")` imports this module by itself. `TableEnv()` is `MoBeE/Table-v0`, three parts at the
-table; it follows the interface of PettingZoo, which has no registry.
+`gymnasium.make("mobee.gymnasium:MoBeE/Reach-v0")` imports this module by itself. `TableEnv()` is `MoBeE/Table-v0`: torso and arms of
+the iCub at a table, each part an agent of its own; it follows the interface of PettingZoo, which has no registry.
 """
 
 from __future__ import annotations

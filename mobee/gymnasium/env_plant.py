@@ -29,7 +29,8 @@ class EnvPlant(InstantPlant):
     Args:
         env: the environment; its observations and actions must be Discrete, so wrap other environments first.
         seed: seed of the first reset.
-        goals: (S, A) the state to which each action is expected to lead; None: not known, then the state itself (see `DiscreteSpace`).
+        goals: (S, A) the state to which each action is expected to lead; None: not known; the goal of each action is then the state in
+            which it starts. With `beliefs="debiased"` goals have little influence on the agent's plans (see `DiscreteSpace`).
 
     Raises:
         InvalidValue: observations or actions are not Discrete.
@@ -66,11 +67,11 @@ class EnvPlant(InstantPlant):
 
     @property
     def q(self) -> Array:
-        """The number of the last observed state in the form of two motor positions, shape (2,); the second number is always 0."""
+        """The last observed state as positions of the space's two motors, shape (2,): the number of the state, and 0."""
         return self.space.target(self._state)
 
     def measure(self, part: str) -> Array:
-        """Return the number of the last observed state in the form of two motor positions, shape (2,); the second number is always 0.
+        """Return the last observed state as positions of the space's two motors, shape (2,): the number of the state, and 0.
 
         `part`: must be `space.part`, else UnknownName is raised.
         """

@@ -149,13 +149,14 @@ class ReachEnv(Env[Any, Any]):
     a link; it is not solid, but its contacts cause repulsive forces.
 
     The observation is a dict: `observation` (3 d,): positions of the joints by the encoders [rad], their attractors [rad], and the
-    controller's own velocities [rad/s]; `achieved_goal` (3,): position of the marker, and `desired_goal` (3,): its goal, both in m in the
-    root frame. A goal is the position of the marker in a random posture in which no force acts on the joints. An episode never terminates;
-    an environment that was made by its id truncates it after 50 steps.
+    controller's own velocities [rad/s]; `achieved_goal` (3,): position of the marker, a named point on the robot, and
+    `desired_goal` (3,): its goal, both in m in the root frame. A goal is the position of the marker in a random posture in which no force
+    acts on the joints. An episode never terminates; an environment that was made by its id truncates it after 50 steps.
 
     `info["is_success"]`: whether the marker is at the goal now. `info["solid_depth"]` and `info["field_depth"]`: m, depth of the deepest
-    contact of solids and of fields during the step, 0 without a contact. Contacts of the robot's solids with the world always count;
-    contacts between solids of two links count only if the fields of these links are tested for contacts too.
+    contact of solids and of fields during the step, 0 without a contact. `solid_depth` includes all contacts of the robot's solids with the
+    world. It includes contacts between solids of two links only if the fields of these links are tested against each other (see
+    `mobee.gymnasium.robots.guarded`).
 
     `reset` puts the robot at home and draws a goal, or takes `options={"goal": (x, y, z)}`, m, root frame.
 

@@ -52,11 +52,11 @@ def model_of(robot: RobotFile, world: WorldFile) -> Model:
 
 @per_robot
 def guarded(robot: Robot) -> Robot:
-    """Return a copy of the robot in which a pair of solids is tested for contacts only if fields keep the pair apart.
+    """Return a copy of the robot that tests fewer pairs of its solids for contacts: only those that fields protect from contacts.
 
-    A field is a shape around a link; its contacts cause repulsive forces. The test of a pair of solids remains if the fields of their links
-    are tested against each other; a link without fields, such as a finger, counts as the next link towards the base that has fields. For
-    example, upper arm and pelvis of the iCub are no longer tested: their hulls overlap when the arm is beside the body.
+    A field is a shape around a link; its contacts cause repulsive forces. Two solids are still tested if the fields of their links are
+    tested against each other. If a link has no fields, such as a finger, those of the nearest link towards the base that has some decide.
+    For example, upper arm and pelvis of the iCub are no longer tested: their hulls overlap when the arm is beside the body.
     """
     with_field = {shape.link for shape in robot.shapes if shape.role == "field"}
     guard = list(range(len(robot.links)))
@@ -71,7 +71,7 @@ def guarded(robot: Robot) -> Robot:
 def plant_settings(given: PlantSettings | None, parts: Sequence[str]) -> PlantSettings:
     """Return the settings of a plant: `given`, or, if this is None, the default settings with ticks of 20 ms.
 
-    `parts`: names of the parts that the plant may move, if the settings do not name such parts (`active`).
+    `parts`: names of the parts that the plant may move; used only if the setting `active`, which names these parts, is None.
     """
     settings = PlantSettings(dt=TICK) if given is None else given
     return settings if settings.active is not None else replace(settings, active=tuple(parts))

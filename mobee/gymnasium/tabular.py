@@ -54,5 +54,8 @@ def river_swim_env(length: int = 6, render_mode: None = None) -> TabularEnv:
 
 
 def deep_sea_env(depth: int = 10, render_mode: None = None) -> TabularEnv:
-    """Return the world of `mobee.learning.tabular.deep_sea` as an environment whose episodes end after `depth` steps, in state 0."""
+    """Return the world of `mobee.learning.tabular.deep_sea` as an environment; each episode ends after `depth` steps.
+
+    The last of these steps returns to state 0, the top.
+    """
     return TabularEnv(deep_sea(depth), returning=True, render_mode=render_mode)

@@ -20,10 +20,10 @@ MOTORS = ("state", "action")
 class DiscreteSpace(Space):
     """Numbered states, each with the same numbered actions, of a decision problem without a robot.
 
-    It is the Space of a robot with two motors, whose positions are the number of the state and of the action. So agents and plants of this
-    library work with it. Before the first try of an action, a transition model contains an imagined outcome in which the action reaches its
-    goal. Without `goals` the result of an action is not known in advance, so the goal is the state itself. Let the agent plan with
-    `beliefs="debiased"`, on which this goal has little influence.
+    It is the Space of a robot with two motors, "state" and "action". The position of each motor is a number: that of the state, or that of
+    the action. So agents and plants of this library work with it. Before the first try of an action, a transition model contains an
+    imagined outcome in which the action reaches its goal. Without `goals` the result of an action is not known in advance, so its goal is
+    the state itself. Then let the agent plan with `beliefs="debiased"`, which gives little weight to the imagined outcome.
 
     Args:
         states: number of states, at least 2.

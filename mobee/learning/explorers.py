@@ -36,8 +36,9 @@ class Explorable(Protocol):
     def plan(self, reward: Array | None = None, beliefs: OutcomeModel | None = None, key: str = "curious") -> tuple[Array, Array]:
         """Compute the values of states (S,) and of actions (S, A) in a plan with the agent's discount.
 
-        `reward`: (S, A); None: the information gain, or the reward of the agent's goal. `beliefs`: outcome model; None: that of the agent.
-        `key`: name of the plan; each plan starts from the values of the previous plan with the same name.
+        `reward`: (S, A); None: the reward that the agent pursues, which is the information gain if it has no goal (see
+        `External.combined`). `beliefs`: outcome model; None: that of the agent. `key`: name of the plan; each plan starts from the values
+        of the previous plan with the same name.
         """
 
 
@@ -53,7 +54,10 @@ transition. Everything else in the scores must depend only on the agent's settin
 
 @dataclass(frozen=True, slots=True)
 class SampledBeliefs:
-    """A transition model that was drawn at random from the posterior: `outcomes` (states) and their `probabilities`, each (S, A, B)."""
+    """A transition model that was drawn at random from the posterior: `outcomes` (states) and their `probabilities`.
+
+    Each has shape (S, A, B): S states, at most A actions of a state, and at most B outcomes of an action.
+    """
 
     outcomes: Ints
     probabilities: Array
@@ -101,14 +105,15 @@ HORIZONS = 2.0  # length of the simulated plan, in units of 1 / (1 - discount)
 def depleting(agent: Explorable, state: int, rng: np.random.Generator) -> Array:
     """Score actions by the discounted sum of expected information gains; if scores are equal, by the gains that remain afterwards.
 
-    The explorer `curious` plans with the gain of the last observation of each state-action. This explorer plans with the gain that is
-    expected of the next observation, under the outcome probabilities of `TransitionModel.debiased`. If the outcome of an action is certain,
-    this expected gain decreases sooner. For an action that was never tried, it is the gain of an imagined success.
+    The explorer `curious` plans with the gain that the last try of each action gave. This explorer plans with the gain that is expected
+    from the next try. The expectation uses the outcome probabilities of `TransitionModel.debiased`: real counts and a weak prior. If the
+    outcome of an action is certain, the expected gain decreases sooner than the last gain. The gain of an action that was never tried is
+    that of an imagined success.
 
     If several actions have nearly equal scores, the best plan is simulated through its most probable outcomes, and the gains of its actions
-    are reduced as if these outcomes were observed. The remaining gains are the rewards of a second plan, whose action values decide. In it,
-    a state with one untried action is worth less than a state with sixteen. Both plans use the agent's beliefs. Raises InvalidValue if the
-    agent's divergence is neither "kail" nor "kl".
+    are reduced as if these outcomes were observed. The remaining gains are the rewards of a second plan, whose action values decide. In
+    this second plan, a state with one untried action has a lower value than a state with sixteen untried actions. Both plans use the
+    agent's beliefs. Raises InvalidValue if the agent's divergence is neither "kail" nor "kl".
     """
     model, actions = agent.model, len(agent.model.space.actions(state))
     if model.divergence not in DIVERGENCES:
@@ -213,9 +218,9 @@ class Draws:
         return Draws, (self._name,)
 
     def at(self, seed: int, count: int) -> np.random.Generator:
-        """Return the generator for a seed and the number `count` of a decision; it is valid until the next call.
+        """Return the random generator of one decision, before it has drawn a number.
 
-        It is always the same object, in the state before its first random number.
+        `count`: the number of the decision. All calls return the same object: use it only until the next call, which resets it.
         """
         self._generator.pending = f"{self._name} {seed} {count}"
         return self._generator

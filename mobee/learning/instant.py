@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plants of one part on which an action ends in the call that performs it."""
+"""Plants of one part that perform an action at once, without a simulation of the motion."""
 
 from __future__ import annotations
 

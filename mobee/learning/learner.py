@@ -99,7 +99,8 @@ class Plans:
     ) -> tuple[Array, Array]:
         """Compute and store the plan `key` for a reward (S, A) and beliefs; return the values of states (S,) and of actions (S, A).
 
-        `requested`: the reward and the beliefs with which the caller asked for the plan (None: the agent's own); `made` compares them.
+        `requested`: the arguments `reward` and `beliefs` of the request for this plan; None stands for the agent's own. Later calls of
+        `made` return the plan only if they are given the same two objects.
         """
         if self.relative:
             before = self._made.get(key)
@@ -174,8 +175,9 @@ class CuriousLearner:
     def plan(self, reward: Array | None = None, beliefs: OutcomeModel | None = None, key: str = "curious") -> tuple[Array, Array]:
         """Return the values of states (S,) and of actions (S, A) of a plan (Algorithm 7). Between two transitions it is computed only once.
 
-        `reward`: (S, A); None: the information gain, or the reward of the agent's goal. `beliefs`: outcome model; None: that of the agent.
-        `key`: name of the plan; each plan starts from the values of the previous plan of the same name.
+        `reward`: (S, A); None: the reward that the agent pursues, which is the information gain if it has no goal (see
+        `External.combined`). `beliefs`: outcome model; None: that of the agent. `key`: name of the plan; each plan starts from the values
+        of the previous plan of the same name, if the setting `relative` is True.
         """
         plan = self._plans.made(key, reward, beliefs)
         if plan is None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Neighbour graphs of samples: the states at which the actions of each state aim, as tables and as edges."""
+"""Neighbour graphs of samples: for each state, the goal states of its actions, as a table (S, A) or as a list of edges (state, goal)."""
 
 from __future__ import annotations
 

@@ -46,11 +46,11 @@ def shortest_actions(space: Space, beliefs: OutcomeModel, start: int, targets: I
 
 
 def passing(actions: dict[tuple[int, int], float]) -> dict[int, float]:
-    """Return a dict from each state to the probability that the most reliable action into it and the most reliable one out of it succeed.
+    """Return for each state the probability that an agent can pass through it: enter it, and leave it again, by the most reliable actions.
 
-    `actions`: a dict from (state, goal state) of an action to its probability of success. The result for a state is the highest probability
-    of the actions that lead to it, times the highest probability of the actions that start in it. States that lack either kind of action
-    are left out.
+    `actions`: a dict from (state, goal state) of an action to its probability of success. The result is a dict from a state to the highest
+    probability of the actions that lead to it, times the highest probability of the actions that start in it. States that lack either kind
+    of action are left out.
     """
     entry: dict[int, float] = {}
     leaving: dict[int, float] = {}
@@ -91,10 +91,10 @@ class Plan:
     agent plans again after each action; infinite if it may come to a state without a known path. `shortest`: number of actions on a
     shortest path if every action reached its goal.
 
-    Two dicts explain why this path is longer than a shortest path. `avoided`: from each state that is on a shortest path, but not on this
-    path, to the probability that the agent can enter it and leave it again along the shortest paths (see `passing`). `distrusted`: from
-    each action on a shortest path, as (state, goal state), to the probability that the action ends in its goal. Both contain only states
-    and actions whose probability is below one half.
+    Two dicts explain why this path is longer than a shortest path. `avoided`: states that are on a shortest path, but not on this path. The
+    value of a state is the probability that the agent can enter it, and leave it again, by actions on shortest paths (see `passing`).
+    `distrusted`: actions on shortest paths, as (state, goal state). The value of an action is the probability that it ends in its goal.
+    Both contain only states and actions whose probability is below one half.
     """
 
     path: tuple[int, ...]
@@ -112,8 +112,8 @@ class Planner:
 
     Args:
         space: states and actions.
-        beliefs: outcomes of the actions and their probabilities, e.g. `model.debiased()`: with the imagined outcomes of a
-            `TransitionModel`, reliable actions would seem unreliable.
+        beliefs: outcomes of the actions and their probabilities, e.g. `model.debiased()` of a `TransitionModel`. The probabilities of
+            `model` itself include imagined failures, so reliable actions that were rarely tried would seem unreliable.
         targets: one or more states.
         discount: factor per step, in [0, 1); with a smaller one, a short path is preferred more over a reliable path.
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Change detection for the outcomes of each action: a posterior over the time since the outcomes changed, and counts since then.
+"""Change detection for the outcomes of each action: a posterior over the time since they changed, and numbers of outcomes since then.
 
-Bayesian online change point detection (Adams and MacKay 2007) for outcomes that are counted. A run is the time since the last change. The
-hazard, the probability of a change before a try, is not a setting: it is one of `HAZARDS` (0.1 to 0.0001), equally likely at first, and its
-probabilities are learned from the outcomes of all actions.
+Bayesian online change point detection (Adams and MacKay 2007) for discrete outcomes. A run is the time since the last change of an action's
+outcomes. The hazard is the probability that they change before the action is performed once more. It is not a setting: it is one of
+`HAZARDS` (0.1 to 0.0001), equally likely at first, and their probabilities are learned from the outcomes of all actions.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ NEGLIGIBLE = 1e-3  # probability below which a run is dropped
 class Runs:
     """The R hypotheses about the present run of an action, the longest run first. A run is the time since the action's outcomes changed.
 
-    `weight`: (R, H) probability of each run, given each of the H hazards (the probability of a change before a try) in HAZARDS. `counts`:
-    (R, B) number of each of the B outcomes since the run began. `suspected`: above 0 if a neighbouring action seems to have changed, and
-    this action may have changed with it: by how much the probability of the neighbour's change has increased. It is 0 again after the next
-    try of this action.
+    `weight`: (R, H) probability of each run, given each of the H hazards in HAZARDS; a hazard is the probability of a change before the
+    action is performed once more. `counts`: (R, B) number of each of the B outcomes since the run began. `suspected`: above 0 if a
+    neighbouring action seems to have changed, because this action may have changed with it. It is the increase of the probability that the
+    neighbour has changed. It is 0 again after this action is performed next.
     """
 
     weight: Array
@@ -40,8 +40,8 @@ class OutcomeRuns:
 
     The time since this change is the run of the action; it is not known, so each possible run has a probability. If the outcomes of an
     action have changed, the outcomes of its neighbours may have changed too. Neighbours are the actions to the same goal, and the action
-    from this goal back to the state. The share of neighbours that change together with an action is learned. If the probability that an
-    action has changed increases by p, the runs of its neighbours end with the probability p times this share.
+    from this goal back to the state. The share of neighbours that change together with an action is learned. If an outcome
+    increases the probability that its action has changed by p, the probability that a neighbour has changed too is p times this share.
 
     Args:
         space: states and actions.
@@ -54,12 +54,15 @@ class OutcomeRuns:
         self._runs: dict[tuple[int, int], Runs] = {}
 
     def counts(self, state: int, action: int, bins: int) -> Array:
-        """Return the expected number of each outcome of an action in a state since the last change, (bins,). `bins`: number of outcomes."""
+        """Return how often each outcome of an action in a state was observed since the last change of the action, (bins,).
+
+        These numbers are expected values over the possible times of the change, which is not known. `bins`: number of outcomes.
+        """
         runs = self._of(state, action, bins)
         return self._expected(runs, self._hazard)
 
     def following(self, state: int, action: int, chosen: int, bins: int) -> Array:
-        """Return the expected numbers, as `counts` returns them, after one more outcome with the index `chosen`, (bins,).
+        """Return what `counts` would return if the outcome with the index `chosen` were observed once more, (bins,).
 
         Nothing is changed. `bins`: number of outcomes of `action` in `state`.
         """
@@ -67,10 +70,10 @@ class OutcomeRuns:
         return self._expected(runs, self._informed(evidence))
 
     def observe(self, state: int, action: int, chosen: int, bins: int) -> list[tuple[int, int]]:
-        """Count one outcome of an action, of index `chosen` among `bins` outcomes.
+        """Record that an action had the outcome with the index `chosen` among its `bins` outcomes.
 
-        Return the neighbours, as (state, action), that are suspect now because this action seems to have changed; their counts have changed
-        too.
+        Return the neighbours, as (state, action), that may have changed because this action seems to have changed; none if it does not. The
+        numbers that `counts` returns for these neighbours are different now.
         """
         before = self._of(state, action, bins)
         after, evidence = self._after(before, chosen)

@@ -97,9 +97,9 @@ class Space:
     def state_of(self, q: ArrayLike) -> int:
         """Return the state whose sample is nearest to a pose of the part, with distances in fractions of the joint ranges.
 
-        `q`: rad, shape (n_part,): all motors of the part, as a plant measures them. If the space has fewer joints than the part has motors,
-        the joints alone are valid too, shape (d,), in the order of `joints`. On a border between states a lattice returns the state with
-        the lower number. Raises InvalidValue for another shape or values that are not finite.
+        `q`: rad, shape (n_part,): positions of all motors of the part, as a plant measures them. If the space has fewer joints than the
+        part has motors, `q` may also be the positions of these joints alone, shape (d,), in the order of `joints`. If several samples are
+        equally near, a `Lattice` returns the lowest state number. Raises InvalidValue for another shape or values that are not finite.
         """
         given = real_array(f"q of {self.part}", q)
         if given.shape == self._targets.shape[1:]:
@@ -136,7 +136,7 @@ class Space:
         return pose
 
     def aim(self, state: int, action: int) -> Array:
-        """Return the target of an action of a state for a plant, shape (n_part,), in [rad]: the sample of the action's goal."""
+        """Return the pose of the part at which an action aims, shape (n_part,), in [rad]: the sample of its goal state, see `target`."""
         return self.target(self.goal(state, action))
 
     @property

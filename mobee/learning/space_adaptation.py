@@ -70,8 +70,9 @@ def with_shortcuts(space: Space, transitions: Sequence[Transition], count: int, 
 def carried(transitions: Sequence[Transition], old: Space, new: Space) -> list[Transition]:
     """Convert transitions of the space `old` to the space `new`, which must have the same joints; return the converted transitions.
 
-    A transition is left out if `new` has no action between states with the same samples as its start and its goal. The end state of a
-    transition becomes the state of `new` that contains the pose recorded at its end. The transitions are numbered again from 1.
+    Start and goal of a transition become the states of `new` with the same samples. A transition is left out if `new` lacks one of these
+    states, or has no action from the start to the goal. The end of a transition becomes the state of `new` that contains the pose recorded
+    there. The transitions are numbered again from 1.
     """
     same = {state: new.state_of_joints(sample) for state, sample in enumerate(old.samples)}
     same = {before: now for before, now in same.items() if np.array_equal(old.samples[before], new.samples[now])}

@@ -71,7 +71,7 @@ class TabularPlant(InstantPlant):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """A hash of the tables of outcomes and probabilities, as a JSON value."""
+        """A dict with one key, "table": a hash (a string) of the outcomes and their probabilities."""
         reached = np.where(self._probabilities > 0.0, self._outcomes, NO_ACTION).astype("<i8")
         return {"table": hashlib.sha256(reached.tobytes() + np.round(self._probabilities, 9).tobytes()).hexdigest()[:16]}
 
@@ -88,9 +88,9 @@ class TabularPlant(InstantPlant):
         return self.space.target(self.state)
 
     def act(self, part: str, target: Array) -> Outcome:
-        """Draw the outcome of the action of the present state that aims at `target` (n_part,) rad; an action counts as 1 s.
+        """Perform the action towards `target` (n_part,) rad: draw its outcome from the table. The outcome's duration is always 1 s.
 
-        Raises InvalidValue if the state has no such action. `part`: must be the part of the space.
+        Raises InvalidValue if the present state has no such action. `part`: must be the part of the space.
         """
         self._check_part(part)
         action = self._action_to(target)
@@ -190,7 +190,8 @@ def half_space(
     Args:
         space: a lattice.
         normal: normal of the plane, towards the forbidden side: one component for each joint, in fractions of its range.
-        depth: position of the plane: 0: at the samples of the states farthest along the normal; 1: at those of the next states.
+        depth: position of the plane along the normal. 0: through the farthest samples of states, so that it cuts off none; 1: through the
+            second farthest samples; values between are interpolated.
         memory: fraction of the distance from the goal to the start by which the outcome is shifted.
         noise: standard deviation for each joint, in fractions of its range: first of actions whose goal is on the free side of the plane,
             then of all others.

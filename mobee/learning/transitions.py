@@ -72,7 +72,7 @@ class DebiasedCounts(Tabled):
     has a probability of 2 / (4 + n) to fail.
 
     Args:
-        model: the outcome model, whose outcomes are used.
+        model: the model that lists the possible outcomes (states) of each action; their order is that of `real`.
         real: (S, A, B) how often each outcome was really observed.
         weight: (S, A) the sums of `real` over the outcomes.
         goal, stay: imagined counts of an action's success (it ends in its goal) and of its failure (it stays); other outcomes have none.
@@ -160,11 +160,11 @@ class TransitionModel(Tabled):
         initial: the outcomes that each action is imagined to have had before its first try: "50-50": one failure (it stays) and one success
             (it reaches its goal); "60-40": one failure and two successes.
         divergence: the reward of an observation: "kail" (Algorithm 6: KL divergence over the bins of the state-action); "kl" (thesis 6.4.2:
-            over all states, each imagined once); a function, see `Divergence`; or the text `module:name` of such a function. It does not
-            change the probabilities.
+            KL divergence over all states, each with one imagined observation); a function, see `Divergence`; or the text `module:name` of
+            such a function. It does not change the probabilities.
         forgetting: in (0, 1]; the real counts of a state-action are multiplied by this before each of its observations.
-        detector: "run_length": detect changes of the outcomes; the real counts are then the expected numbers since the last change, see
-            `OutcomeRuns`. "none": all observations count.
+        detector: "run_length": detect changes of the outcomes; each real count is then the expected number of observations since the last
+            change, see `OutcomeRuns`. "none": all observations count.
 
     Raises:
         InvalidValue, UnknownName: an argument is out of its range or unknown; the message states the valid ones.
@@ -221,8 +221,9 @@ class TransitionModel(Tabled):
 
         Before the first try it is the gain of an imagined success. If `divergence` is a function, its value stands in place of the gain.
 
-        With the detector "run_length", an observation can also raise the gain of other actions that have been tried. If the outcomes of the
-        observed action seem to have changed, these are the actions with the same goal, and the action from this goal back to the state.
+        With the detector "run_length", an observation can also raise the gain of other actions, if the outcomes of the observed action seem
+        to have changed. These other actions are those with the same goal, and the action from this goal back to the state; their gain is
+        raised only if they have been tried.
         """
         return read_only(self._reward)
 
@@ -267,9 +268,10 @@ class TransitionModel(Tabled):
 
     @property
     def imagined(self) -> Array:
-        """The imagined part of each bin's count, shape (B,): of staying, of reaching the goal, and of further outcomes (read only).
+        """The imagined observations in the count of each bin, shape (B,) (read only).
 
-        A bin is one distinct outcome of a state-action, B the largest number of bins; the imagined part is the same for all state-actions.
+        A bin is one distinct outcome of a state-action, B the largest number of bins. Bin 0: the action stays; bin 1: it reaches its goal;
+        the others: further outcomes. The values are the same for all state-actions.
         """
         return read_only(self._imagined)
 
@@ -283,11 +285,11 @@ class TransitionModel(Tabled):
         return self._outcomes[state, action, :used].copy(), self._counts[state, action, :used].copy()
 
     def debiased(self, goal: float = 0.3, stay: float = 0.1) -> DebiasedCounts:
-        """Return outcome probabilities for plans: from the real counts and a weak prior. Later observations of this model update them.
+        """Return outcome probabilities for planning, from the real counts and a weak prior. Later observations of this model update them.
 
-        `goal`, `stay`: imagined counts of an action's success (it ends in its goal, above 0) and of its failure (it stays, at least 0), in
-        place of the imagined counts of Algorithm 8. For the same two numbers the same object is returned. Raises InvalidValue for a number
-        out of its range.
+        `goal`, `stay`: the prior, which replaces the imagined counts of Algorithm 8: imagined counts of an action's success (it ends in its
+        goal; above 0) and of its failure (it stays; at least 0). For the same two numbers the same object is returned. Raises InvalidValue
+        for a number out of its range.
         """
         if not (0.0 < goal < np.inf and 0.0 <= stay < np.inf):
             raise InvalidValue(f"goal={goal!r}, stay={stay!r}: give counts, the first above 0 and the second at least 0.")

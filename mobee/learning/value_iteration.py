@@ -69,8 +69,9 @@ def value_iteration(
 ) -> tuple[Array, Array]:
     """Compute the values of states V (S,) and of actions Q (S, A) under the best policy, by value iteration (thesis Algorithm 7).
 
-    The sweeps stop when no value changes by the tolerance or more. The thesis prints the change without its absolute value; the sweeps
-    would then stop at once when values must decrease (negative rewards, or a start from earlier values after a reward has decreased).
+    The sweeps stop when no value changes by the tolerance or more. The change is an absolute value. The thesis prints it without the
+    absolute value; so its sweeps would stop at once when values must decrease (negative rewards, or a start from earlier values after a
+    reward has decreased).
 
     Args:
         model: the outcomes of the actions; a state without actions keeps its starting value.
@@ -79,9 +80,9 @@ def value_iteration(
         tolerance: above 0; the values are within tolerance * discount / (1 - discount) of the exact values.
         start: (S,) values with which the first sweep begins; None: 0.
         relative: True: the tolerance is in units of the largest |reward| of an action (of 1 if all are 0); False: in units of the reward.
-        method: "jacobi": Algorithm 7: every sweep updates all actions, until no action value changes; "modified": modified policy
-            iteration, faster: after each such sweep, further sweeps update only the best action of each state, until no state value
-            changes.
+        method: "jacobi": Algorithm 7: every sweep updates all actions; it stops when no action value changes by the tolerance or more.
+            "modified": modified policy iteration, faster: after each such sweep, a few sweeps update only the best action of each state; it
+            stops when a sweep over all actions changes no state value by the tolerance or more.
 
     Returns:
         V and Q, with Q = -inf where there is no action.

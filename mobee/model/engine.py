@@ -22,7 +22,7 @@ OBJECTS_PER_CELL = 8  # of the grid, on average
 
 @per_robot
 def robot_handle(robot: Robot) -> core.Handle:
-    """Return the handle of a robot in the compiled core, without carried objects.
+    """Return the compiled core's handle of a robot; world objects that are attached to its links are not included.
 
     At the first call for a robot its tables are sent to the core; later calls return the same handle.
     """
@@ -88,10 +88,10 @@ class Engine:
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands, cut: bool = False, threads: int = 1) -> tuple[ContactTable, Array]:
         """Return all contacts in the poses q (B, n) rad, and their projection to the motors, (B, n) m^2/rad.
 
-        The projection is the sum of J^T (depth * normal) over the contacts of fields, volumes that cause repulsive forces; J is the
-        Jacobian of the contact's point. `snapshot`: the state of the world. `reaching`: the hands that reach for targets; their contacts
-        with targets are ignored. `cut`: True: a contact acts only on the motors of the part that touches, as in the MoBeE program of
-        2014; False: also on the motors nearer to the base. `threads`: number of threads; the results do not depend on it.
+        The projection is the sum of J^T (depth * normal) over the contacts of fields. Fields are volumes that cause repulsive forces; J is
+        the Jacobian of the contact's point. `snapshot`: the state of the world. `reaching`: the hands that reach for targets; their
+        contacts with targets are ignored. `cut`: True: a contact acts only on the motors of the touching link's own part, as in the MoBeE
+        program of 2014; False: also on the motors nearer to the base. `threads`: number of threads; the results do not depend on it.
         """
         scene = self.scene_of(snapshot)
         try:
@@ -105,10 +105,10 @@ class Engine:
     def contacts_of_one(self, q: bytes, snapshot: Snapshot, reaching: Hands, cut: bool = False) -> tuple[ContactTable, Array]:
         """Return the contacts of one pose, and their projection to the motors, (n,) m^2/rad.
 
-        The projection is the sum of J^T (depth * normal) over the contacts of fields, volumes that cause repulsive forces; J is the
-        Jacobian of the contact's point. `q`: the pose (n,) rad as bytes of float64. `snapshot`: the state of the world. `reaching`: the
-        hands that reach for targets; their contacts with targets are ignored. `cut`: True: a contact acts only on the motors of the part
-        that touches, as in the MoBeE program of 2014; False: also on the motors nearer to the base.
+        The projection is the sum of J^T (depth * normal) over the contacts of fields. Fields are volumes that cause repulsive forces; J is
+        the Jacobian of the contact's point. `q`: the pose (n,) rad as bytes of float64. `snapshot`: the state of the world. `reaching`: the
+        hands that reach for targets; their contacts with targets are ignored. `cut`: True: a contact acts only on the motors of the
+        touching link's own part, as in the MoBeE program of 2014; False: also on the motors nearer to the base.
         """
         try:
             room = self._rooms.pop()  # atomic: other threads take buffers too

@@ -58,10 +58,10 @@ class FclEngine:
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands, cut: bool = False, threads: int = 1) -> tuple[ContactTable, Array]:
         """Return all contacts in the poses q (B, n) rad, and their projection to the motors, (B, n) m^2/rad.
 
-        The projection is the sum of J^T (depth * normal) over the contacts of fields, volumes that cause repulsive forces; J is the
-        Jacobian of the contact's point. `snapshot`: the state of the world. `reaching`: the hands that reach for targets; their contacts
-        with targets are ignored. `cut`: True: a contact acts only on the motors of the part that touches, as in the MoBeE program of 2014;
-        False: also on the motors nearer to the base. `threads`: not used; the poses are computed one after the other.
+        The projection is the sum of J^T (depth * normal) over the contacts of fields. Fields are volumes that cause repulsive forces; J is
+        the Jacobian of the contact's point. `snapshot`: the state of the world. `reaching`: the hands that reach for targets; their
+        contacts with targets are ignored. `cut`: True: a contact acts only on the motors of the touching link's own part, as in the MoBeE
+        program of 2014; False: also on the motors nearer to the base. `threads`: not used; the poses are computed one after the other.
         """
         transforms = link_transforms(self.robot, q)
         pairs = self._tested(snapshot, reaching)
@@ -76,10 +76,10 @@ class FclEngine:
     def contacts_of_one(self, q: bytes, snapshot: Snapshot, reaching: Hands, cut: bool = False) -> tuple[ContactTable, Array]:
         """Return the contacts of one pose, and their projection to the motors, (n,) m^2/rad.
 
-        The projection is the sum of J^T (depth * normal) over the contacts of fields, volumes that cause repulsive forces; J is the
-        Jacobian of the contact's point. `q`: the pose (n,) rad as bytes of float64. `snapshot`: the state of the world. `reaching`: the
-        hands that reach for targets; their contacts with targets are ignored. `cut`: True: a contact acts only on the motors of the part
-        that touches, as in the MoBeE program of 2014; False: also on the motors nearer to the base.
+        The projection is the sum of J^T (depth * normal) over the contacts of fields. Fields are volumes that cause repulsive forces; J is
+        the Jacobian of the contact's point. `q`: the pose (n,) rad as bytes of float64. `snapshot`: the state of the world. `reaching`: the
+        hands that reach for targets; their contacts with targets are ignored. `cut`: True: a contact acts only on the motors of the
+        touching link's own part, as in the MoBeE program of 2014; False: also on the motors nearer to the base.
         """
         table, torque = self.contacts(np.frombuffer(q)[None], snapshot, reaching, cut)
         return table, torque[0]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Forward kinematics and Jacobians of a tree from its joint axes at zero pose, for batches, in NumPy; rotations and quaternions.
+"""Forward kinematics and Jacobians of batches of poses in NumPy, computed from the joint axes at zero pose; rotations and quaternions.
 
 Quaternions are in the order w, x, y, z.
 """
@@ -20,10 +20,10 @@ class Tables:
 
     At the angle or length a, the motion of a joint is the matrix (4, 4) I + sin(a) S + (1 - cos(a)) C + a D: Rodrigues' formula for a
     rotation about a line of the root frame. `sine`, `cosine` and `slide`, each (J, 4, 4), are the S, C and D of the joints; `slide` None:
-    every joint is revolute. `coupling` (n, J), `offset` (J,): joint positions = q @ coupling + offset. `axes` (J, 3), `points` (J, 3) m: of
-    the joints, root frame, zero pose. `revolute`: (J,) 1 or 0. `ancestry`: for each link, the joints from the base to the link, in this
-    order. `rounds`: the order of the matrix products (pointer jumping): each round is a pair of arrays: links, and the ancestors by whose
-    matrices theirs are multiplied from the left.
+    every joint is revolute. `coupling` (n, J), `offset` (J,): joint positions = q @ coupling + offset. `axes` (J, 3), `points` (J, 3) m:
+    unit vector of each joint's axis, and a point on it, root frame, zero pose. `revolute`: (J,) 1 or 0. `ancestry`: for each link, the
+    joints from the base to the link, in this order. `rounds`: the matrix products in their order (pointer jumping). Each round is two
+    arrays of equal length, links and ancestors: the matrix of each link becomes (matrix of its ancestor) @ (matrix of the link).
     """
 
     coupling: Array  # (n, J), transposed: joint angles = q @ coupling + offset

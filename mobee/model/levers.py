@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Levers: how much the depth of a contact changes when the motors move; and factors of the repulsive pushes that depend on levers."""
+"""Levers: how much the depth of a contact changes when the motors move; and, computed from the levers, factors of repulsive pushes."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from mobee.robot.robot import LEVER, Robot
 def lever(robot: Robot, transforms: Array, links: tuple[int, int], point: Array, normal: Array) -> float:
     """Return the lever of a contact of two links [m/rad]: the norm of the derivatives of its depth with respect to the motor positions.
 
-    A joint that moves both links does not count. For a motor that slides, the unit is the length that counts as 1 rad
-    (`mobee.robot.motor_units`). `transforms`: (L, 4, 4) of all links. `links`: indices; below 0: a free object. `point` (3,) m and `normal`
-    (3,) of the contact: root frame, in this pose.
+    A joint that moves both links does not count. For a motor that slides, a certain length replaces 1 rad, see
+    `mobee.robot.motor_units.motor_units`. `transforms`: (L, 4, 4) of all links. `links`: indices; below 0: a free object. `point` (3,) m
+    and `normal` (3,) of the contact: root frame, in this pose.
     """
     change = np.zeros(len(robot.motors))
     for link, sign in zip(links, (1.0, -1.0), strict=True):
@@ -26,12 +26,12 @@ def lever(robot: Robot, transforms: Array, links: tuple[int, int], point: Array,
 
 
 def push_factors(robot: Robot, transforms: Array, links: Ints, depths: Array, points: Array, normals: Array) -> Array:
-    """Return the factors (c,) by which the pushes depth * normal of c contacts of fields are multiplied.
+    """Return the factors (c,) that multiply the repulsive pushes, depth * normal, of c contacts of fields.
 
-    Fields are volumes that cause repulsive forces, the pushes. The factors are 1 if `robot.least_lever` is 0. Otherwise a factor is LEVER^2
-    / (lever^2 + least_lever^2), with LEVER = 0.5 m, times the depth of the contact divided by the sum of the depths of all contacts between
-    its two links: our extension of thesis eq. 5.11 (docs/law.md). `transforms`: (L, 4, 4) of all links. `links` (c, 2): indices; all free
-    objects (-1) count as one link. `depths` (c,) m, `points` (c, 3) m, `normals` (c, 3): of the contacts, root frame.
+    Fields are volumes that cause repulsive forces. The factors are 1 if `robot.least_lever` is 0. Otherwise a factor is LEVER^2 / (lever^2
+    + least_lever^2) * depth / total, with LEVER = 0.5 m; the total is the sum of the depths of all contacts between the same two links.
+    This is our extension of thesis eq. 5.11 (docs/law.md). `transforms`: (L, 4, 4) of all links. `links` (c, 2): indices; all free objects
+    (-1) count as one link. `depths` (c,) m, `points` (c, 3) m, `normals` (c, 3): of the contacts, root frame.
     """
     factors = np.ones(len(depths))
     if robot.least_lever <= 0.0:

@@ -27,7 +27,7 @@ class Masses:
     moments: Array
 
     def moved(self, transforms: Array) -> Array:
-        """Return the mass times the centre of mass of each link, (..., B, 3) kg m, root frame, in a pose.
+        """Return mass * centre of mass of each of the B links that have a mass, (..., B, 3) kg m, root frame, in a pose.
 
         `transforms`: (..., L, 4, 4) of all links in this pose.
         """

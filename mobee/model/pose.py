@@ -19,14 +19,14 @@ from mobee.robot.robot import Robot
 
 
 class Finder(Protocol):
-    """An object that computes the contacts of poses, such as an engine or a list of neighbouring pairs (`mobee.model.track.Neighbours`)."""
+    """An object that computes the contacts of poses, for example an `Engine` or `mobee.model.track.Neighbours`."""
 
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands) -> tuple[ContactTable, Array]:
         """Return all contacts in the poses q (B, n) rad, and their projection to the motors, (B, n) m^2/rad.
 
-        The projection is the sum of J^T (depth * normal) over the contacts of fields, volumes that cause repulsive forces; J is the
-        Jacobian of the contact's point. `snapshot`: the state of the world. `reaching`: the hands that reach for targets; their contacts
-        with targets are ignored.
+        The projection is the sum of J^T (depth * normal) over the contacts of fields. Fields are volumes that cause repulsive forces; J is
+        the Jacobian of the contact's point. `snapshot`: the state of the world. `reaching`: the hands that reach for targets; their
+        contacts with targets are ignored.
         """
 
 
@@ -48,19 +48,19 @@ class Engine(Protocol):
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands, cut: bool = False, threads: int = 1) -> tuple[ContactTable, Array]:
         """Return all contacts in the poses q (B, n) rad, and their projection to the motors, (B, n) m^2/rad.
 
-        The projection is the sum of J^T (depth * normal) over the contacts of fields, volumes that cause repulsive forces; J is the
-        Jacobian of the contact's point. `snapshot`: the state of the world. `reaching`: the hands that reach for targets; their contacts
-        with targets are ignored. `cut`: True: a contact acts only on the motors of the part that touches, as in the MoBeE program of 2014;
-        False: also on the motors nearer to the base. `threads`: number of threads; the results do not depend on it.
+        The projection is the sum of J^T (depth * normal) over the contacts of fields. Fields are volumes that cause repulsive forces; J is
+        the Jacobian of the contact's point. `snapshot`: the state of the world. `reaching`: the hands that reach for targets; their
+        contacts with targets are ignored. `cut`: True: a contact acts only on the motors of the touching link's own part, as in the MoBeE
+        program of 2014; False: also on the motors nearer to the base. `threads`: number of threads; the results do not depend on it.
         """
 
     def contacts_of_one(self, q: bytes, snapshot: Snapshot, reaching: Hands, cut: bool = False) -> tuple[ContactTable, Array]:
         """Return the contacts of one pose, and their projection to the motors, (n,) m^2/rad.
 
-        The projection is the sum of J^T (depth * normal) over the contacts of fields, volumes that cause repulsive forces; J is the
-        Jacobian of the contact's point. `q`: the pose (n,) rad as bytes of float64. `snapshot`: the state of the world. `reaching`: the
-        hands that reach for targets; their contacts with targets are ignored. `cut`: True: a contact acts only on the motors of the part
-        that touches, as in the MoBeE program of 2014; False: also on the motors nearer to the base.
+        The projection is the sum of J^T (depth * normal) over the contacts of fields. Fields are volumes that cause repulsive forces; J is
+        the Jacobian of the contact's point. `q`: the pose (n,) rad as bytes of float64. `snapshot`: the state of the world. `reaching`: the
+        hands that reach for targets; their contacts with targets are ignored. `cut`: True: a contact acts only on the motors of the
+        touching link's own part, as in the MoBeE program of 2014; False: also on the motors nearer to the base.
         """
 
 
@@ -131,7 +131,10 @@ class Pose:
 
     @property
     def table(self) -> ContactTable:
-        """All contacts of the tested pairs in every pose, as a table with columns."""
+        """All contacts in every pose, as a table with columns.
+
+        Some pairs of volumes are not tested, see `mobee.model.fcl_engine.tested_pairs`.
+        """
         evaluated = self._evaluated
         if evaluated is None:
             evaluated = self._evaluated = self._computed(False)
@@ -141,9 +144,9 @@ class Pose:
     def projection(self) -> Array:
         """The projection of the contacts to the motors: the sum of J^T (depth * normal), (..., n) m^2/rad (the sum in thesis eq. 5.11).
 
-        The sum is over the contacts of fields, volumes that cause repulsive forces; J is the Jacobian of the contact's point. In a contact
-        of two links, the push acts on the first link, and the opposite push on the second. A push acts on all motors from its link down to
-        the base. If `robot.least_lever` is above 0, each push is multiplied by a factor (`mobee.model.levers.push_factors`).
+        The sum is over the contacts of fields. Fields are volumes that cause repulsive forces; J is the Jacobian of the contact's point. In
+        a contact of two links, the push acts on the first link, and the opposite push on the second. A push acts on all motors from its
+        link down to the base. If `robot.least_lever` is above 0, each push is multiplied by a factor (`mobee.model.levers.push_factors`).
         """
         evaluated = self._evaluated
         if evaluated is None:
@@ -162,7 +165,10 @@ class Pose:
 
     @property
     def contacts(self) -> tuple[Contact, ...]:
-        """All contacts of the tested pairs in this pose, solids before fields; raises InvalidValue for a batch of poses."""
+        """All contacts in this pose, solids before fields; raises InvalidValue for a batch of poses.
+
+        Some pairs of volumes are not tested, see `mobee.model.fcl_engine.tested_pairs`.
+        """
         if self.q.ndim != 1:
             raise InvalidValue(f"contacts belong to one pose, and this is a batch of shape {self.q.shape}; use table, or evaluate one q.")
         if self._contacts is None:

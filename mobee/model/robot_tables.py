@@ -37,18 +37,18 @@ class Carried:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RobotTables:
-    """The tables of a robot that core/robot.cpp reads: S shapes in the order of C clusters, J joints, V corners of convex shapes.
+    """The tables of a robot that core/robot.cpp reads: S shapes, sorted by their C clusters; J joints; V corners of convex shapes.
 
     `motors`: number of motors. `own_shapes`: number of shapes without carried objects. `least_lever`: m. Joints: `parent` (J,) the link
     that carries the joint; `slides` (J,) whether it is prismatic; `border` (J,) whether the link that the joint moves belongs to another
-    part than `parent`; `axis` (J, 3) and `point` (J, 3) m of the axis, root frame, zero pose; `motor` (K, J) the at most K motors that
-    drive the joint; `scale` (K, J) joint angle per motor angle, 0 in unused entries; `offset` (J,) joint angle while the motors are at 0;
-    `travel` (K, J) motion of the joint [rad or m] when the motor moves by what counts as 1 rad in the control law. Shapes: `volume` (S,)
-    rows of VOLUME; `link` (S,); `name` (S,) index into the robot's shapes, then the carried objects; `field` (S,) whether it is a field,
-    which causes repulsive forces; `meets_world` (S,) whether it is tested against free objects; `cluster` (C + 1,) first shape of each
-    cluster; `tested` (S, S) whether two shapes are tested against each other. Corners: `corner` (V, 3) m, relative to the position of the
-    shape, along its axes; `edge_start` (V + 1,) index in `edge` of the first edge of each corner; `edge`: the corner at the other end, as
-    its index among the corners of the shape.
+    part than `parent`; `axis` (J, 3) and `point` (J, 3) m of the axis, root frame, zero pose; `motor` (K, J) indices of the motors that
+    drive the joint, at most K; `scale` (K, J) joint angle per motor angle, 0 in unused entries; `offset` (J,) joint angle while the motors
+    are at 0; `travel` (K, J) motion of the joint [rad or m] when the motor moves by its unit (`mobee.robot.motor_units.motor_units`).
+    Shapes: `volume` (S,) rows of VOLUME; `link` (S,); `name` (S,) index into the robot's shapes, then the carried objects; `field` (S,)
+    whether it is a field, which causes repulsive forces; `meets_world` (S,) whether it is tested against free objects; `cluster` (C + 1,)
+    first shape of each cluster; `tested` (S, S) whether two shapes are tested against each other. Corners: `corner` (V, 3) m, relative to
+    the position of the shape, along its axes; `edge_start` (V + 1,) index in `edge` of the first edge of each corner; `edge`: the corner at
+    the other end, as its index among the corners of the shape.
     """
 
     motors: int
@@ -75,7 +75,7 @@ class RobotTables:
     least_lever: float
 
     def for_core(self) -> tuple[dict[str, float], dict[str, NDArray[Any]]]:
-        """Return the single numbers and the contiguous arrays, each by name, in the form that `mobee._core.engine.robot` needs."""
+        """Return the two arguments of `mobee._core.engine.robot`: the scalars by name, and the contiguous arrays by name."""
         integers = ("parent", "slides", "border", "motor", "link", "name", "field", "meets_world", "cluster")
         others = ("axis", "point", "scale", "offset", "volume", "tested", "corner", "edge_start", "edge", "travel")
         arrays = {name: np.ascontiguousarray(getattr(self, name), dtype=np.int64) for name in integers}

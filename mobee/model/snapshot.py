@@ -45,7 +45,7 @@ EMPTY = Snapshot(0, MappingProxyType({}), (), np.empty(0, dtype=VOLUME), np.empt
 
 
 def extended(old: Snapshot, new: WorldObject) -> Snapshot:
-    """Return the snapshot after `old`, with the object `new` added at the end."""
+    """Return the next snapshot: `old` with one more object, `new`, at the end."""
     count, role = len(old.names), _code(new)
     rows, roles = np.empty(count + 1, dtype=VOLUME), np.empty(count + 1, dtype=np.int64)
     rows[:count], rows[count] = old.rows, volume_row(new)
@@ -55,7 +55,7 @@ def extended(old: Snapshot, new: WorldObject) -> Snapshot:
 
 
 def changed(old: Snapshot, new: WorldObject) -> Snapshot:
-    """Return the snapshot after `old`, in which the object `new` replaces the object with the same name."""
+    """Return the next snapshot: `old`, in which the object `new` replaces the object with the same name."""
     place, role = old.names.index(new.name), _code(new)
     rows, roles, attached = old.rows.copy(), old.roles, old.attached
     rows[place] = volume_row(new)
@@ -67,7 +67,7 @@ def changed(old: Snapshot, new: WorldObject) -> Snapshot:
 
 
 def shortened(old: Snapshot, name: str) -> Snapshot:
-    """Return the snapshot after `old`, without the object with the given name."""
+    """Return the next snapshot: `old` without the object with the given name."""
     place, count = old.names.index(name), len(old.names)
     rows, roles = np.empty(count - 1, dtype=VOLUME), np.empty(count - 1, dtype=np.int64)
     rows[:place], rows[place:] = old.rows[:place], old.rows[place + 1 :]
@@ -111,9 +111,9 @@ NO_HANDS: Hands = ()
 
 @lru_cache(maxsize=64)
 def hand_numbers(reaching: Hands) -> tuple[int, ...]:
-    """Return the hands in the form that the core needs (`Hands` in core/scene.hpp): `link` and `fields` of two hands; -1: no hand.
+    """Return four link indices for the compiled core: `link` and `fields` of the first hand, then of the second; -1: no hand.
 
-    Raises ValueError for more than two hands.
+    The order is that of `Hands` in core/scene.hpp. Raises ValueError for more than two hands.
     """
     found = [number for hand in reaching for number in (hand.link, hand.fields)]
     if len(found) > 2 * MAX_HANDS:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Evaluates poses that follow each other closely, with a list of the pairs that are near each other (a neighbour list)."""
+"""Evaluates a sequence of poses, fast if each is near the previous one; uses a list of the near pairs of volumes (a neighbour list)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Neighbours:
     """Computes the contacts of a robot in consecutive poses, with a list of the pairs of volumes that are near each other.
 
     An object is for one thread at a time. `skin`: m; pairs nearer than this are in the list. `cut`: True: a contact acts only on the motors
-    of the part that touches, as in the MoBeE program of 2014; False: also on the motors nearer to the base.
+    of the touching link's own part, as in the MoBeE program of 2014; False: also on the motors nearer to the base.
     """
 
     def __init__(self, engine: Engine, skin: float, cut: bool = False) -> None:
@@ -33,9 +33,9 @@ class Neighbours:
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands) -> tuple[ContactTable, Array]:
         """Return all contacts in the consecutive poses q (B, n) rad, and their projection to the motors, (B, n) m^2/rad.
 
-        The projection is the sum of J^T (depth * normal) over the contacts of fields, volumes that cause repulsive forces; J is the
-        Jacobian of the contact's point. `snapshot`: the state of the world. `reaching`: the hands that reach for targets; their contacts
-        with targets are ignored.
+        The projection is the sum of J^T (depth * normal) over the contacts of fields. Fields are volumes that cause repulsive forces; J is
+        the Jacobian of the contact's point. `snapshot`: the state of the world. `reaching`: the hands that reach for targets; their
+        contacts with targets are ignored.
         """
         self.enter(snapshot, reaching)
         numbers, reals, torque = self._core.follow(q)

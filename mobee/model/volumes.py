@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Volumes as rows of a table that the core reads."""
+"""Volumes (spheres, capsules, cylinders, boxes, convex hulls) as rows of a table that the compiled core reads."""
 
 from __future__ import annotations
 

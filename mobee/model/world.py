@@ -139,8 +139,8 @@ class World:
         """Attach an object to a link of the robot: it moves with the link, and contacts between the two are ignored.
 
         `relative`: position (3,) m and rotation (3, 3) of the object in the link's frame, which is the root frame at zero pose. None: the
-        object keeps its present place relative to the link, in the robot's pose of the last call of `follow`; `Model.attach` takes the
-        pose as an argument. Raises UnknownName, and InvalidValue for values that are not valid or if no pose is known.
+        object keeps its place relative to the link in the pose that was last given to `follow`. (`Model.attach` has the pose as an
+        argument.) Raises UnknownName, and InvalidValue for values that are not valid or if no pose is known.
         """
         pose = None if relative is None else (valid_position(name, relative[0]), valid_rotation(name, relative[1]))
         with self._lock:
@@ -154,7 +154,7 @@ class World:
             self._snapshot = changed(self._snapshot, replace(old, position=pose[0], rotation=pose[1], link=link))
 
     def detach(self, name: str) -> None:
-        """Detach an object from its link; it stays at the place that it has in the robot's pose of the last call of `follow`.
+        """Detach an object from its link. It then stays where the link holds it in the pose that was last given to `follow`.
 
         Raises UnknownName, and InvalidValue if the object is not attached or no pose is known.
         """

@@ -75,8 +75,8 @@ def damping(s: State) -> Array:
 def following(s: State, outside: Array) -> Array:
     """Return C q*', (n,) rad/s^2, which makes the damping relative to the velocity of a moving attractor; 0 if the attractor is at rest.
 
-    `outside` (n,) rad/s^2: the sum of all forces except spring and damping.  A motor yields to such a force if it opposes the velocity of
-    the attractor: C q*' is reduced in proportion to the force, and is 0 for a force of YIELD (0.25 rad/s^2) or more.
+    `outside` (n,) rad/s^2: the sum of all forces except spring and damping.  If the outside force on a motor opposes the velocity of its
+    attractor, C q*' of this motor is reduced in proportion to the force, and is 0 for a force of YIELD (0.25 rad/s^2) or more.
     """
     if s.goal_velocity is None:
         return np.zeros(len(s.q))
@@ -87,7 +87,7 @@ def following(s: State, outside: Array) -> Array:
 
 
 def config_force(s: State) -> Array:
-    """Return f_config = L(f) (eq. 5.9), (n,) rad/s^2, where f is the client's force on the motors."""
+    """Return f_config = L(f) (eq. 5.9), (n,) rad/s^2: `bounded_client` of the force f = `State.force` that a client wants; 0 if None."""
     return bounded_client(s.robot, s.gains, s.force) if s.force is not None else np.zeros(len(s.q))
 
 
@@ -117,8 +117,8 @@ def bounded_client(robot: Robot, gains: Gains, f: Array) -> Array:
 def squash_together(f: Array, maximum: Array, slope: Array, unit: Array) -> Array:
     """Saturate the norm of the force f (k,) on several motors, so that it keeps its direction.
 
-    `maximum`, `slope` (k,): bound and slope at 0 of each motor, as in eq. 5.8; if they differ, all motors get the smallest factor. `unit`
-    (k,): the motion of each motor that counts as 1 rad (`mobee.robot.motor_units`).
+    `maximum`, `slope` (k,): bound and slope at 0 of each motor, as in eq. 5.8. They give a factor for each motor; f is multiplied by the
+    smallest one. `unit` (k,): the motion of each motor that the control law treats as 1 rad (`mobee.robot.motor_units`).
     """
     length = float(np.linalg.norm(f / unit))
     shares = maximum / unit / (maximum / unit / slope + length)
@@ -129,8 +129,9 @@ def limit_force(s: State) -> Array:
     """Return f_lim (eqs. 5.12, 5.13), (n,) rad/s^2, which pushes the motors out of the zones at their limits.
 
     It is 0 inside [q_min + zone, q_max - zone]. Outside it is a ramp that points inward, with slope f_max / delta, and continues beyond the
-    limit. The thesis misprints the ranges of the cases; here the force is continuous and points inward. A zone has the width delta =
-    `limit_width`; it is narrower if the range is narrow or the zone ends at home (`mobee.robot.motor_units.limit_zones`).
+    limit. The intervals of the cases in the thesis are misprinted; here the force is continuous and points inward. A zone has the width
+    delta = `limit_width`. It is narrower for a motor with a narrow range, or if it would include the home position of a motor with
+    `zone_ends_at_home` (`mobee.robot.motor_units.limit_zones`).
     """
     width = s.gains.of_robot("limit_width", s.robot)
     (low, high), (below, above) = s.robot.limits.T, limit_zones(s.robot, width).T
@@ -140,19 +141,20 @@ def limit_force(s: State) -> Array:
 
 
 def clause_force(s: State) -> Array:
-    """Return f_cst (eqs. 5.14 to 5.17), (n,) rad/s^2, which keeps all clauses satisfied, in the variant `gains.law` of the control law.
+    """Return f_cst (eqs. 5.14 to 5.17), (n,) rad/s^2, which keeps all clauses satisfied; `gains.law` chooses between its two variants.
 
-    A clause is a condition on motor positions: at least one of its rows must hold. It acts while none of its rows holds with a margin of
-    `constraint_width`. A row holds when a.q + b > 0, the convention of the robot files; the thesis prints n.q < b (eq. 5.14).
+    A clause is a condition on motor positions: a list of rows, inequalities a.q + b > 0, of which at least one must hold. It pushes while
+    no row holds with a margin of `constraint_width`. The signs are those of the robot files; the thesis prints n.q < b (eq. 5.14).
     """
     return clauses_2014(s) if s.gains.law == "published_2014" else clauses_default(s)
 
 
 def clauses_default(s: State) -> Array:
-    """Return f_cst of the default law, (n,) rad/s^2: each acting clause pushes along the unit normals of all its rows (eqs. 5.15, 5.17).
+    """Return f_cst of the default law, (n,) rad/s^2: each clause pushes along the unit normals of all its rows (eqs. 5.15, 5.17).
 
-    A clause is a condition on motor positions: at least one of its rows a.q + b > 0 must hold. The size of the push is computed from the
-    row that is nearest to being satisfied, so that the force is continuous.
+    A clause is a condition on motor positions: a list of rows, inequalities a.q + b > 0, of which at least one must hold. It pushes while
+    no row holds with a margin of `constraint_width`. The size of the push is computed from the row with the largest distance
+    (a.q + b) / |a|, so that the force is continuous.
     """
     unit, total = motor_units(s.robot), np.zeros(len(s.q))
     for clause in s.robot.clauses:
@@ -164,10 +166,11 @@ def clauses_default(s: State) -> Array:
 
 
 def clauses_2014(s: State) -> Array:
-    """Return f_cst, the force that keeps the clauses (conditions on motor positions) satisfied, of the 2014 program, (n,) rad/s^2.
+    """Return f_cst of the 2014 program, (n,) rad/s^2: the force that keeps the clauses (conditions on motor positions) satisfied.
 
-    The zone in which a clause acts has a width in units of a.q + b. Every row of an acting clause pushes in proportion to its own deficit,
-    which is 0 where the zone begins and 1 at the boundary. The sum is clipped to +-1 for each motor and multiplied by `max_constraint`.
+    A clause is a list of rows, inequalities a.q + b > 0, of which at least one must hold. The deficit of a row is 1 - (a.q + b) /
+    `constraint_width`: 1 at its boundary, 0 where the row holds with that margin. If no row of a clause has a negative deficit, each of
+    its rows pushes in proportion to its deficit. The sum is clipped to +-1 for each motor and multiplied by `max_constraint`.
     """
     unit, total = motor_units(s.robot), np.zeros(len(s.q))
     for clause in s.robot.clauses:
@@ -187,11 +190,11 @@ def contact_force(s: State) -> Array:
 
 
 def projected(robot: Robot, q: Array, contacts: Iterable[Contact], propagate: Literal["tree", "part"] = "tree") -> Array:
-    """Return the sum in eq. 5.11 of J(g)^T f_g over both sides g of every contact of fields, with f_g = +-depth * normal; (n,) m^2/rad.
+    """Return the sum of J(g)^T f_g in eq. 5.11, (n,) m^2/rad: two terms g for each contact of fields, one for each of its two links.
 
-    A field is a volume that causes a repulsive force; contacts of solids do not count. `propagate`: "tree": a contact acts on all motors
-    from its link down to the base; "part": only on the motors of the part that touches, as in the original program. If `robot.least_lever`
-    is above 0, f_g is multiplied by `push_factor`.
+    f_g = depth * normal for the first link, and the opposite for the second. A field is a volume that causes a repulsive force; contacts
+    between two solids are left out. `propagate`: "tree": a contact acts on all motors from its link down to the base; "part": only on the
+    motors of the part that touches, as in the original program. If `robot.least_lever` is above 0, f_g is multiplied by `push_factor`.
     """
     frames, per_joint, contacts = link_frames(robot, q), np.zeros(len(robot.joints)), list(contacts)
     for contact in contacts:
@@ -208,11 +211,12 @@ def projected(robot: Robot, q: Array, contacts: Iterable[Contact], propagate: Li
 def push_factor(robot: Robot, frames: Array, contact: Contact, contacts: Sequence[Contact]) -> float:
     """Return the factor by which the push of a contact of fields is multiplied; 1 for a robot without a least lever.
 
-    A field is a volume that causes a repulsive force, the push. For a robot with a least lever the factor is LEVER^2 / (|J|^2 +
+    A field is a volume that causes a repulsive force, the push. If `robot.least_lever` is above 0, the factor is LEVER^2 / (|J|^2 +
     least_lever^2), with LEVER = 0.5 m, times the depth of the contact divided by the sum of the depths of all contacts of fields between
-    the same two links. J (n,) is the change of the depth per motion of each motor by 1 rad (of a slide, by its `unit`). With this factor
-    J^T pushes along the smallest motion that ends the contact, for any lever, and all contacts between two links together push as one.
-    `frames`: (L, 4, 4), as from `link_frames`. `contacts`: all contacts of the pose.
+    the same two links. J (n,): the derivative of the depth with respect to each motor (m/rad; for a slide, m per `motor_units`). |J| is the
+    lever of the contact. Without the factor, J^T pushes weakly if the lever is short. With it, the push is proportional to the smallest
+    motion that ends the contact, J^T depth / |J|^2, if |J| is well above least_lever. All contacts between two links together push like
+    one. `frames`: (L, 4, 4), as from `link_frames`. `contacts`: all contacts of the pose.
     """
     if robot.least_lever == 0.0:
         return 1.0
@@ -227,10 +231,11 @@ def push_factor(robot: Robot, frames: Array, contact: Contact, contacts: Sequenc
 
 
 def bounded_contact(robot: Robot, gains: Gains, torque: Array) -> Array:
-    """Return L of the sum in eq. 5.11: saturate the norm of the force on each part as in eq. 5.8; returns (n,) rad/s^2.
+    """Saturate the norm of the contact force on each part (L of eq. 5.11, in the form of eq. 5.8); returns (n,) rad/s^2.
 
-    `torque`: the sum, (n,) m^2/rad. `gains`: of the control law; its variant "published_2014", that of the MoBeE program of 2014, squares
-    the norm, in degrees, before it is saturated.
+    `torque`: the sum in eq. 5.11, (n,) m^2/rad, which is first multiplied by `gains.contact_gain`. If `gains.law` is "published_2014", as
+    in the MoBeE program of 2014, this product is then multiplied by its own norm, so that its norm is squared. The result is taken in
+    deg/s^2, converted to rad/s^2 and then saturated.
     """
     unit = motor_units(robot)
     force = gains.contact_gain * torque * unit
@@ -243,7 +248,10 @@ def bounded_contact(robot: Robot, gains: Gains, torque: Array) -> Array:
 
 
 def joints_of_part(robot: Robot, link: int) -> list[int]:
-    """Return the indices of the joints of a link's own part between the link and the base, the nearest to the link first."""
+    """Return the indices of the joints of the link's own part that lie between the link and the base, the nearest to the link first.
+
+    The list ends before the first joint of another part.
+    """
     part, chain = part_of(robot, link), []
     for j in joints_to(robot, link):
         if part_of(robot, j + 1) != part:
@@ -253,9 +261,10 @@ def joints_of_part(robot: Robot, link: int) -> list[int]:
 
 
 def part_of(robot: Robot, link: int) -> str | None:
-    """Return the name of the part that moves a link: of the motor that drives its joint, else the part of its parent link.
+    """Return the name of the part that moves a link: the part of the motor that drives the link's joint.
 
-    `link`: index. None for the base, and for links that no motor moves.
+    If no motor drives that joint, it is the part that moves the parent link. `link`: index. Returns None for the base, and for links that
+    no motor moves.
     """
     matrix, _ = robot.coupling
     for j in joints_to(robot, link):

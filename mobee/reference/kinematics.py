@@ -37,7 +37,7 @@ def rotation(axis: Array, angle: float) -> Array:
 def joint_motion(joint: Joint, position: float) -> Array:
     """Return the transform of one joint, (4, 4): a rotation about its axis, x -> R (x - p) + p, or a translation along its axis.
 
-    `position`: position of the joint, rad or m.
+    p: `joint.point`, a point on the axis. `position`: position of the joint, rad or m.
     """
     motion = np.eye(4)
     if joint.kind == "revolute":

@@ -63,8 +63,8 @@ class Motion:
 def acceleration(state: State, terms: Sequence[Term] = TERMS) -> Array:
     """Return q" of eq. 5.7 with mass 1, (n,) rad/s^2: the sum of all terms, plus C q*' for an attractor that moves.
 
-    `terms`: the forces, each a function of the state; the functions `spring` and `damping` must not be replaced by copies, since all other
-    functions count as outside forces, which reduce the term C q*' (`following`).
+    `terms`: the forces, each a function of the state. Every function except `spring` and `damping` themselves counts as an outside force,
+    and outside forces reduce the term C q*' (`following`). Therefore a copy or a wrapper of these two must not be used.
     """
     total, outside = np.zeros(len(state.q)), np.zeros(len(state.q))
     for term in terms:
@@ -89,8 +89,8 @@ def step(robot: Robot, gains: Gains, motion: Motion, q: Array, wanted: Array, dt
     """Advance the dynamical system by dt [s], semi-implicitly (first the velocity, then the position), and return the new state.
 
     `q` (n,) rad: measured. `wanted` (n,) rad/s^2: q" of eq. 5.7. The commanded velocity stays within the motors' limits of velocity (times
-    `speed_scale`) and acceleration. The position reference integrates the velocity, but waits while it is ahead of the measured position by
-    more than the motor moves in LEASH (0.3 s) at full speed. Motors of weight 0 in the gains are never moved.
+    `speed_scale`) and acceleration. The position reference integrates the velocity. It stops when it is ahead of the measured position by
+    more than the distance that the motor moves in LEASH (0.3 s) at full speed. Motors of weight 0 in the gains are never moved.
     """
     fastest = INSIDE * speed_scale * np.array([motor.max_velocity for motor in robot.motor_table])
     hardest = INSIDE * np.array([motor.max_acceleration for motor in robot.motor_table])
@@ -120,9 +120,9 @@ def hold(robot: Robot, motion: Motion, part: str) -> Motion:
 
 
 def torque(robot: Robot, motion: Motion, q: Array) -> Array:
-    """Return the torque command, (n,) N m: the torques for acceleration, viscous friction and the robot's weight at q (n,) rad.
+    """Return the torque command, (n,) N m: the sum of the torques for acceleration, viscous friction and the robot's weight at q (n,) rad.
 
-    Each is clipped to the motor's largest torque.
+    The sum is clipped to the largest torque of each motor.
     """
     most = np.array([motor.max_torque for motor in robot.motor_table])
     wanted = INERTIA * motion.acceleration + FRICTION * motion.velocity + weight_torque(robot, q)
@@ -130,9 +130,10 @@ def torque(robot: Robot, motion: Motion, q: Array) -> Array:
 
 
 def is_settled(robot: Robot, gains: Gains, motion: Motion, part: str) -> bool:
-    """Return whether a part has settled (thesis 6.1): no motor is commanded beyond the settle speed and the settle acceleration.
+    """Return whether a part has settled (thesis 6.1): its motors have small commanded velocities and accelerations.
 
-    The bounds are in `gains.settle`. The caller checks this `first_check` s after the action began, then every `interval` s, until
+    The velocity of each must be at most `gains.settle.speed`, and the acceleration at most `gains.settle.acceleration`. For a slide, both
+    bounds are multiplied by its `fine_units`. The caller checks this `first_check` s after the action began, then every `interval` s, until
     `timeout`.
     """
     where, unit = robot.part(part).slice, fine_units(robot)

@@ -2,7 +2,7 @@
 """The transition model and planning of a curious agent: Algorithms 6 and 7 and the start of Algorithm 8 (thesis 6.4, 6.5).
 
 T(s, a) (thesis eq. 6.1) is the distribution of the states in which action a of state s ends. It is stored as counts of observed
-outcomes, with a count only for states that were an outcome; eqs. 6.2 to 6.4 say which states can be outcomes.
+outcomes. Only states that have been an outcome have a count; eqs. 6.2 to 6.4 define which states can be outcomes.
 """
 
 from __future__ import annotations
@@ -20,8 +20,9 @@ IMAGINED = {"50-50": ("stay", "goal"), "60-40": ("stay", "goal", "goal")}  # out
 def observe(bins: Bins, outcome: int) -> tuple[Bins, float]:
     """Count an outcome (state) of a state-action (Algorithm 6); return the new counts and the reward R = KL(P || T) in nats (eq. 6.5).
 
-    `bins`: dict from each state that was an outcome to its count; an outcome that it does not contain gets the count 2. T is the
-    distribution before the observation, P that after it: R is the sum over the bins j of ln(P_j / T_j) P_j. Examples: eqs. 6.6 to 6.9.
+    `bins`: dict from each state that was an outcome to its count; an outcome that it does not contain is first added with the count 1.
+    Then the count of the outcome increases by 1. T is the distribution before this increase, P that after it: R is the sum over the bins j
+    of ln(P_j / T_j) P_j. Examples: eqs. 6.6 to 6.9.
     """
     before = bins if outcome in bins else bins | {outcome: 1.0}  # a new bin starts at 1
     after = before | {outcome: before[outcome] + 1.0}
@@ -43,8 +44,9 @@ def imagined(state: int, goal: int, initial: str = "50-50") -> tuple[Bins, float
 def forget(bins: Bins, floor: Bins, factor: float) -> Bins:
     """Multiply the counts of real observations by `factor` and return all counts; an agent that forgets does this before each observation.
 
-    `bins`: dict from state to count. Each count is the sum of an imagined count, from before the first try, which is not changed, and of
-    real observations. `floor`: dict from state to imagined count; the imagined count of a state that it does not contain is 1.
+    `bins`: dict from state to count. Each count is the sum of an imagined count, given before the action was first tried (`imagined`), and
+    of a count of real observations. The imagined count is not changed. `floor`: dict from state to imagined count; the imagined count of a
+    state that it does not contain is 1.
     """
     return {end: floor.get(end, 1.0) + factor * (count - floor.get(end, 1.0)) for end, count in bins.items()}
 
@@ -82,7 +84,8 @@ def value_iteration(
 
     `outcomes` (S, A, B): the states in the B bins of each state-action; `chances` (S, A, B): their probabilities. `reward` (S, A); -inf: no
     such action. `discount`: factor of future rewards, 0 to 1. `start` (S,): first values, None: 0; a state without actions keeps its value.
-    The thesis prints the change without its absolute value, with which the sweeps would end too early whenever values have to decrease.
+    Algorithm 7 as printed compares the change with the tolerance without taking its absolute value. Then the sweeps would end too early
+    when values have to decrease.
     """
     values = np.zeros(len(outcomes)) if start is None else start
     exists = chances.any(axis=-1) & (reward != -np.inf)

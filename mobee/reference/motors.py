@@ -29,9 +29,9 @@ class MotorState:
     """The state of all n motors of a robot; arrays (n,). A motor has a motor side and a joint side, with play between them.
 
     `q` (rad), `velocity` (rad/s): of the joint side. `motor_q`, `motor_velocity`: of the motor side. `mode`: "position", "velocity",
-    "torque" or "hold". `reference`: rad, rad/s or N m, by mode. `resting`, `rest`: in hold, whether the motor is at rest, and where [rad].
-    `load`: N m, the robot's weight, which acts on motors in torque mode. `line`: the delayed commands (rad/s; N m in torque mode), one (n,)
-    for each substep, the newest last.
+    "torque" or "hold". `reference`: the command, in rad (position), rad/s (velocity) or N m (torque). `resting`: whether a motor in hold
+    has come to rest. `rest`: rad, the position that it then keeps. `load`: N m, the robot's weight, which acts on motors in torque mode.
+    `line`: the delayed commands (rad/s; N m in torque mode), one (n,) for each substep, the newest last.
     """
 
     q: Array
@@ -82,7 +82,10 @@ def command(s: MotorState, where: slice, mode: str, reference: Array | None = No
 
 
 def drive(robot: Robot, parameters: MotorParameters, s: MotorState, dt: float) -> Array:
-    """Advance the motor sides by a substep of dt [s]; return the positions (n,) rad to which they drag the joint sides."""
+    """Advance the motor sides by a substep of dt [s]; return the positions (n,) rad to which they push the joint sides.
+
+    A joint side moves only if the motor side has reached the end of the play; in torque mode there is no play.
+    """
     fastest = np.array([motor.max_velocity for motor in robot.motor_table])
     hardest = np.array([motor.max_acceleration for motor in robot.motor_table])
     strongest = np.array([motor.max_torque for motor in robot.motor_table])
@@ -148,7 +151,8 @@ def nearer_to_zero(x: Array, by: Array) -> Array:
 def adopt(robot: Robot, parameters: MotorParameters, s: MotorState, q: Array, dt: float) -> None:
     """Set the positions q (n,) rad of the joint sides at the end of a substep of dt [s], and their velocities, in place.
 
-    The motor side stays within the play of the joint side, also when the joint is blocked; in torque mode both move together.
+    The motor side stays within half the play of the joint side, so if the joint is blocked, the motor side stops too. In torque mode the
+    motor side takes over the position and the velocity of the joint side.
     """
     torque, half = s.mode == "torque", parameters.of_robot("backlash", robot) / 2.0
     s.velocity, s.q = (q - s.q) / dt, q

@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """The force that pulls a marker to a target with one part or the whole body (thesis 5.1, 8.2).
 
-Published law: J^T f, with f proportional to the distance of the marker, bounded as a client's force, against the attractor's spring.
+Published law: J^T f, with f proportional to the distance of the marker, saturated like a client's force (eq. 5.9). The attractor's spring
+pulls against it.
 
-Default law: J^T control oscillates with late commands, because its stiffness depends on the pose: the stiffness is J J^T plus, for a far
-target, the curvature of the marker's path. J^T control also stops in singular poses (thesis 5.1). Therefore the marker is pulled at the
-same RATE in every direction, by (J E J^T + damping)^-1 e, where e is the remaining error and E the mobility of the motors. The force leads
-out of a singular pose along a direction in which the error has negative curvature. Limits, clauses and contacts count as walls, along which
-the motion continues. The attractor's spring is removed while the reach lasts.
+Default law: J^T control oscillates if the motors execute commands with a delay, because its stiffness depends on the pose: the stiffness is
+J J^T plus, for a far target, a term from the curvature of the marker's path. J^T control also stops in singular poses (thesis 5.1).
+Therefore the marker is pulled at the same RATE in every direction, by (J E J^T + damping)^-1 e, where e is the remaining error and E the
+mobility of the motors (`motor_mobility`). The force leads out of a singular pose along a direction in which the error has negative
+curvature. If the forces at limits, clauses and contacts oppose the motion, it continues along them as along a wall. The attractor's spring
+is removed while the reach lasts.
 """
 
 from __future__ import annotations
@@ -89,7 +91,8 @@ class View:
 
     `error`: (3,) m, from the marker to its goal. `turn`: (3,) n x n*, the axis about which the normal n should turn to the wanted normal
     n*. `facing`: n . n*. `columns`: (k, 6), velocity and angular velocity of the marker for each of the k joints between base and marker.
-    `drives`: (k, m), motion of these joints for each of the m pulled motors (`Reach.motors`), per unit of the motor in the control law.
+    `drives`: (k, m), motion of these joints when one of the m pulled motors (`Reach.motors`) moves by 1 rad (a slide: by its
+    `motor_units`).
     """
 
     error: Array
@@ -139,7 +142,10 @@ def reach_force(r: Reach, s: State, dt: float, against: Array) -> Array:
 
 
 def bounded(r: Reach, force: Array) -> Array:
-    """Saturate a force on the m pulled motors, (m,), with the bounds of a client's force; returns (m,) in the units of the motors."""
+    """Saturate a force on the m pulled motors, (m,) rad/s^2, with the gains for a client's force, `max_client` and `client_slope`.
+
+    Returns (m,) rad/s^2; for a motor that slides, m/s^2 (`mobee.robot.motor_units`).
+    """
     maximum, slope = (r.gains.of_robot(name, r.robot)[r.motors] for name in ("max_client", "client_slope"))
     unit = motor_units(r.robot)[r.motors]
     if r.gains.client_squash == "each":
@@ -150,8 +156,8 @@ def bounded(r: Reach, force: Array) -> Array:
 def published(r: Reach, v: View) -> Array:
     """Return the force of the 2014 program on the m pulled motors, (m,), not yet saturated: J^T f.
 
-    The force on the marker is 5000 (x* - x). For a wanted normal n* the moment 5000 |x* - x| (1 - n.n*) / 2 (n x n*) is added. The 5000 are
-    deg/s^2 for a lever and a distance of 1 m; here they are converted to rad/s^2.
+    The force on the marker is 5000 (x* - x). If its normal n should have the direction n*, the moment 5000 |x* - x| (1 - n.n*) / 2 (n x n*)
+    is added. With the factor 5000 and lengths in m, the force on a motor is in deg/s^2; here it is converted to rad/s^2 (FORCE_GAIN).
     """
     twist = 0.5 * float(np.linalg.norm(v.error)) * (1.0 - v.facing) * v.turn
     force: Array = FORCE_GAIN * v.jacobian.T @ np.concatenate([v.error, twist])
@@ -161,8 +167,9 @@ def published(r: Reach, v: View) -> Array:
 def drawn(r: Reach, v: View, s: State, dt: float, against: Array) -> tuple[Array, Array]:
     """Return the force of the default law on the m pulled motors, (m,), not yet saturated, and a shift of their positions, (m,) rad.
 
-    Springs pull the motors by the shift, which leads out of a singular pose; it is 0 in other poses.  `dt`: the tick [s]. `against` (n,)
-    rad/s^2: the sum of all other forces except the springs. The state of the reach is updated.
+    The caller adds the force of a spring that is extended by the shift: it moves the motors out of a singular pose. In other poses the
+    shift is 0.  `dt`: the tick [s]. `against` (n,) rad/s^2: the sum of all other forces except the springs. The state of the reach is
+    updated.
     """
     jacobian, error = rows(r, v)
     note_error(r, error, dt)
@@ -191,9 +198,10 @@ def rows(r: Reach, v: View) -> tuple[Array, Array]:
 
 
 def note_error(r: Reach, error: Array, dt: float) -> None:
-    """Update the averaged error of the reach with `error` [m], and the time since the averaged error last decreased.
+    """Update the averaged error of the reach with `error` [m], and the time since the last decrease of its norm (`Reach.since`).
 
-    The average is exponential with the time constant SMOOTH (0.25 s); `dt`: the tick [s].
+    A decrease counts if the norm falls more than BETTER (0.5 mm) below `Reach.best`, its value at the last such decrease. The average
+    is exponential with the time constant SMOOTH (0.25 s). `dt`: the tick [s].
     """
     seen = r.seen[: len(error)]
     seen += (min(1.0, dt / SMOOTH) if r.best < math.inf else 1.0) * (error - seen)
@@ -206,8 +214,8 @@ def note_error(r: Reach, error: Array, dt: float) -> None:
 def motor_mobility(r: Reach, q: Array, slope: Array) -> Array:
     """Return the mobility E of the m pulled motors, (m,): the velocity of each motor per unit of force.
 
-    It is the slope of the saturation at 0 divided by the damping, and 0 for a motor in the outer half of a limit zone (where f_lim acts)
-    that the reach would move farther outward. `slope` (m,): the decrease of half the squared error along each motor.
+    It is the gain `client_slope` (k of eq. 5.8) divided by the gain `damping`. It is 0 for a motor that is in the outer half of a limit
+    zone, where f_lim acts, if the reach would move it towards the limit. `slope` (m,): J^T e, as `slope_at` returns it.
     """
     zones = 0.5 * limit_zones(r.robot, r.gains.of_robot("limit_width", r.robot))
     low, high = r.robot.limits.T + zones.T * np.array([[1.0], [-1.0]])
@@ -219,8 +227,9 @@ def motor_mobility(r: Reach, q: Array, slope: Array) -> Array:
 def pushed(r: Reach, v: View, marker_mobility: Array, pull: Array, mobility: Array) -> Array:
     """Return the force on the marker, (rows,): (J E J^T / size + damping)^-1 pull, with enough damping for a stable motion.
 
-    `marker_mobility` (rows, rows): J E J^T / size, where size is the norm of J E J^T. `pull` (rows,): the wanted motion of the marker.
-    `mobility` (m,): E. The damping is doubled until the stiffness from the curvature of the marker's path is below RATE (5 1/s).
+    `marker_mobility` (rows, rows): J E J^T / size, where size is the norm of J E J^T. `pull` (rows,): the wanted velocity of the marker,
+    divided by size. `mobility` (m,): E, from `motor_mobility`. The damping is doubled until the largest eigenvalue of `bend_of_path`, a
+    rate, is below RATE (5 1/s).
     """
     soft = SOFT
     while True:
@@ -234,8 +243,8 @@ def pushed(r: Reach, v: View, marker_mobility: Array, pull: Array, mobility: Arr
 def bend_of_path(v: View, push: Array, mobility: Array) -> Array:
     """Return the stiffness that the curvature of the marker's path adds to the reach, (m, m): -E^1/2 (push . d2x/dq2) E^1/2.
 
-    `push` (rows,): the force on the marker. `mobility` (m,): E. For joints a and b, with a nearer to the base, the second derivative of the
-    path is the cross product of the axis of a and the marker's motion with b.
+    `push` (rows,): the force on the marker. `mobility` (m,): E, from `motor_mobility`. x: the position of the marker. For two joints a and
+    b, a nearer to the base, d2x/(da db) is the cross product of the axis of a and the derivative dx/db.
     """
     count = len(v.columns)
     along = np.zeros((count, count))
@@ -266,10 +275,11 @@ def largest_eigenvalue(matrix: Array, mobility: Array, turns: int) -> tuple[floa
 
 
 def along_walls(r: Reach, v: View, s: State, against: Array, force: Array, mobility: Array, size: float, pull: Array) -> Array:
-    """Return the force on the m pulled motors, (m,), without its component against limits and other forces.
+    """Return the force of the reach on the m pulled motors, (m,), with a smaller component against limits and other forces.
 
-    So the motors slide along limits and contacts as along a wall. `against` (n,) rad/s^2: the sum of all other forces except the springs.
-    `force` (m,): of the reach without walls. `mobility` (m,): E. `size`: norm of J E J^T. `pull` (rows,): the wanted motion of the marker.
+    The stronger these forces are, the smaller is the component. So the motors slide along limits and contacts as along a wall. `against`
+    (n,) rad/s^2: the sum of all other forces except the springs. `force` (m,): the force of the reach before this change. `mobility` (m,):
+    E, from `motor_mobility`. `size`: norm of J E J^T. `pull` (rows,): the wanted velocity of the marker, divided by `size`.
     """
     jacobian, unit = rows(r, v)[0], motor_units(r.robot)[r.motors]
     limit = limit_force(s)[r.motors]
@@ -293,8 +303,9 @@ def along_walls(r: Reach, v: View, s: State, against: Array, force: Array, mobil
 def escape_direction(r: Reach, q: Array, mobility: Array, size: float) -> Array:
     """Return a unit vector (m,) of motor motions that leads out of a singular pose; 0 if there is none.
 
-    Along this vector, and along its opposite, the error decreases to second order (negative curvature). The sign is that of the last tick;
-    in the first tick the vector points towards the middle of the motors' ranges. `mobility` (m,): E. `size`: norm of J E J^T.
+    Along this vector, and along its opposite, the error decreases to second order (negative curvature). Of the two, the one nearer to the
+    vector of the last tick (`Reach.escape`) is returned; without such a vector, the one towards the middle of the motors' ranges.
+    `mobility` (m,): E, from `motor_mobility`. `size`: norm of J E J^T.
     """
     curve = np.empty((len(r.motors), len(r.motors)))
     for k, motor in enumerate(r.motors):
@@ -314,7 +325,10 @@ def escape_direction(r: Reach, q: Array, mobility: Array, size: float) -> Array:
 
 
 def slope_at(r: Reach, q: Array) -> Array:
-    """Return the decrease of half the squared error per motion of each of the m pulled motors, (m,), at q (n,) rad."""
+    """Return J^T e at q (n,) rad, (m,), with the Jacobian J and the error e of `rows`.
+
+    For an error of the position, it is the derivative of -|e|^2 / 2 with respect to each of the m pulled motors.
+    """
     jacobian, error = rows(r, view(r, q))
     slope: Array = jacobian.T @ error
     return slope

@@ -117,7 +117,7 @@ class Raster:
             nothing.
         normal: (H, W, 3), of the surface, root frame.
         which: (H, W), index of the solid in the list `solids`; -1 where there is nothing.
-        group: (H, W), group of the solid; -1 where there is nothing.
+        group: (H, W), `Solid.group` of the solid: solids with the same number have no outline between them. -1 where there is nothing.
         color: (H, W, 3), of the solid, 0 to 1.
     """
 

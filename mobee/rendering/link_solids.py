@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The coloured volumes and meshes that are drawn for a robot's links: the visuals of its file, else the solids of the link."""
+"""The coloured volumes and meshes that are drawn for a robot's links.
+
+A link is drawn as the visuals in the robot's file. If it has none that can be drawn, its solids are drawn: its volumes that have contacts.
+"""
 
 from __future__ import annotations
 

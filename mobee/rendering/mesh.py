@@ -53,7 +53,7 @@ class Piece:
 
 
 def read_pieces(source: MeshSource) -> tuple[Piece, ...]:
-    """Return the triangles of a mesh in the axes of its visual, one piece for each object in its file.
+    """Return the triangles of a mesh, relative to the frame of its visual, scaled; one piece for each object in its file.
 
     Raises RobotFileError if the file is missing or cannot be read, and NotInstalled without the package that reads it.
     """
@@ -154,9 +154,9 @@ def simplified(mesh: Mesh, most: int) -> Mesh:
 
 
 def fair_most(counts: Sequence[int], budget: int) -> int:
-    """Return the largest limit for the triangles of one piece with which all pieces together stay within `budget` triangles.
+    """Return the limit to which the number of triangles of each piece must be reduced, so that all pieces together have at most `budget`.
 
-    `counts`: number of triangles of each piece.
+    It is the largest such limit; if no piece must be reduced, it is the largest count. `counts`: number of triangles of each piece.
     """
     left = budget
     for rest, count in zip(range(len(counts), 0, -1), sorted(counts), strict=True):

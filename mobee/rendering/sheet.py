@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sheets of pictures as PNG files: filmstrips of motions, and the positions of markers in many poses (as thesis figs. 3.1, 3.2).
 
-Of a plant: `with recorded(plant) as recording: plant.act(...)`, then `filmstrip([Strip(recording.motion(), "right_palm")], path)`.
-Of poses (T, n) rad, such as a path of a roadmap: `Strip(motion_through(model, q), "right_palm", views=("oblique", "top"))`.
+Pictures of a plant's motion: `with recorded(plant) as recording: plant.act(...)`, then
+`filmstrip([Strip(recording.motion(), "right_palm")], path)`.
+Pictures of poses (T, n) rad, such as a path of a roadmap: `Strip(motion_through(model, q), "right_palm", views=("oblique", "top"))`.
 """
 
 from __future__ import annotations
@@ -54,9 +55,10 @@ class Strip:
         motion: the motion.
         marker: name of the marker whose path is drawn.
         views: names of `camera.VIEWS`, or (azimuth, elevation) in degrees.
-        poses: number of pictures in a row.
+        poses: largest number of pictures in a row.
         title: text above the first row.
-        caption: takes the motion and the number of a pose, and returns the text below its picture; None: the time of the pose.
+        caption: function of the motion and the index of a pose in `motion.poses`; it returns the text below the picture of this pose.
+            None: the text is the time of the pose.
         bright: parts in full colour, all others are pale; None: the parts that moved.
     """
 

@@ -36,15 +36,15 @@ class Solid:
 
     Attributes:
         kind: "sphere", "box", "cylinder", "capsule", "convex" or "mesh".
-        size: m, lengths of the kind: sphere (radius,); capsule and cylinder (radius, height); box (x, y, z), full edges; convex and mesh
+        size: m, depends on the kind: sphere (radius,); capsule and cylinder (radius, height); box (x, y, z), full edges; convex and mesh
             ().
         position: (3,) m, root frame.
         rotation: (3, 3), root frame.
         color: red, green, blue, 0 to 1.
         opacity: below 1 the volume is transparent.
-        veiled: share of its colour that shows through opaque volumes in front of it, 0 to 1.
+        veiled: share of its colour, 0 to 1, that remains visible where opaque volumes are in front of it; 0: it is hidden there.
         group: there is no outline between solids of the same group.
-        vertices: (V, 3) m, for "convex", in its own axes.
+        vertices: (V, 3) m, corners for "convex", in the solid's frame (`position`, `rotation`).
         aside: whether it may lie outside of the picture's frame.
         mesh: the triangles, for "mesh".
     """
@@ -81,8 +81,8 @@ class Solid:
 def ball(position: Array, radius: float, color: Color, veiled: float = 0.0, group: int = 0) -> Solid:
     """Return a sphere at a position (3,) m, root frame, with a radius [m].
 
-    `color`: red, green, blue, 0 to 1. `veiled`: share of its colour that shows through volumes in front of it. `group`: solids of the same
-    group have no outline between them.
+    `color`: red, green, blue, 0 to 1. `veiled`: share of its colour, 0 to 1, that remains visible where opaque volumes are in front of
+    it; 0: it is hidden there. `group`: solids of the same group have no outline between them.
     """
     return Solid("sphere", (radius,), position, np.eye(3), color, veiled=veiled, group=group)
 
@@ -90,8 +90,8 @@ def ball(position: Array, radius: float, color: Color, veiled: float = 0.0, grou
 def tube(points: Array, radius: float, colors: Sequence[Color], veiled: float = 0.0, group: int = 0) -> list[Solid]:
     """Return a tube of capsules along the line through points (P, 3) m, root frame, with a radius [m].
 
-    `colors`: colours of the P - 1 pieces. `veiled`: share of the colour that shows through volumes in front of it. `group`: solids of the
-    same group have no outline between them.
+    `colors`: colours of the P - 1 pieces. `veiled`: share of the colour, 0 to 1, that remains visible where opaque volumes are in front of
+    the tube; 0: it is hidden there. `group`: solids of the same group have no outline between them.
     """
     pieces = []
     for start, end, color in zip(points[:-1], points[1:], colors, strict=True):
@@ -141,8 +141,9 @@ class Packed:
     """Solids in the form that the compiled core reads.
 
     `volumes`: (N,) structured array (dtype CONVEX) of the volumes. `surfaces`: (M,) structured array (dtype SURFACE) of the meshes.
-    `numbers`: for each of these N + M volumes and meshes, volumes first, its index in the list of solids that was packed. `kept`: arrays to
-    which the tables point; they must exist as long as the tables.
+    `numbers`: for each of these N + M volumes and meshes, volumes first, its index in the list of solids that was packed. `kept`: arrays
+    to which pointers in `volumes` refer; keep them as long as `volumes` is used. Pointers in `surfaces` refer to arrays of the solids'
+    meshes.
     """
 
     volumes: NDArray[np.void]

@@ -51,7 +51,8 @@ def check_edges(
         step: largest straight distance between successive checked poses [m], of the marker or of the centres of the shapes.
         marker: name of the marker whose motion `step` limits; None: it limits the motion of the centre of every shape.
         threads: number of threads; the result does not depend on it.
-        reaching: names of up to two markers; contacts of their hands with targets are ignored.
+        reaching: name of a marker, or names of up to two; contacts between targets and the hand of each marker (its link, the
+            links that this carries, and more, see `Model.hand`) are ignored.
     """
     return checked(model, q, edges, step, marker, threads, reaching).free
 
@@ -68,7 +69,8 @@ def checked(
         step: largest straight distance between successive checked poses [m], of the marker or of the centres of the shapes.
         marker: name of the marker whose motion `step` limits; None: it limits the motion of the centre of every shape.
         threads: number of threads; the result does not depend on it.
-        reaching: names of up to two markers; contacts of their hands with targets are ignored.
+        reaching: name of a marker, or names of up to two; contacts between targets and the hand of each marker (its link, the
+            links that this carries, and more, see `Model.hand`) are ignored.
     """
     if not step > 0.0:
         raise InvalidValue(f"step {step} m: it must be above 0.")
@@ -89,8 +91,9 @@ def checked(
 def between(model: Model, q: Array, edges: Ints, step: float = STEP, marker: str | None = None) -> Ints:
     """Return how many intermediate poses of each edge must be checked, without its two ends, (E,).
 
-    `q`: (V, n) rad, poses. `edges`: (E, 2) indices in q of the two poses of each edge. With this number of poses, the marker moves at most
-    `step` [m] between successive poses; without a marker, the centre of every shape does.
+    `q`: (V, n) rad, poses. `edges`: (E, 2) indices in q of the two poses of each edge. The number is the smallest for which the straight
+    distance of the marker between the two ends, divided by (number + 1), is at most `step` [m]. Without a marker, this holds for the centre
+    of every shape.
     """
     far = np.zeros(len(edges))
     places = points(model, q, marker)
@@ -180,9 +183,9 @@ class EdgeWatch:
     def near(self, item: WorldObject) -> Flags:
         """Return whether the robot could touch the object `item` on each edge, (E,).
 
-        The test is conservative: it may also return True for an edge on which no contact is possible. It compares the distances of the
-        object from the shapes at the two ends of the edge with half of the length of each shape's path. `item` must not be attached to a
-        link.
+        The test is conservative: it may also return True for an edge on which no contact is possible. For each shape
+        it computes the distance of the object from the shape's bounding ball at both ends of the edge. The result is True if, for a shape,
+        the smaller distance is below half of the length of the path of the shape's centre. `item` must not be attached to a link.
         """
         found = np.zeros(len(self._edges), dtype=np.bool_)
         for middles, radius, half_path in zip(self._middles, self._bounds, self._half_paths, strict=True):

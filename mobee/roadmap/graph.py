@@ -42,8 +42,8 @@ def nearest(y: Array, spacing: ArrayLike, count: int) -> Ints:
 def nearest_before(y: Array, spacing: ArrayLike, count: int) -> Ints:
     """Return edges (E, 2) from each of V vertices to the `count` nearest vertices with a lower number, as in thesis Algorithm 4.
 
-    Distances are Euclidean in y (V, m) / spacing. The resulting graph is connected. With as many neighbours as task coordinates it consists
-    of simplices. Each edge occurs once, its lower vertex first, and the edges are sorted.
+    Distances are Euclidean in y (V, m) / spacing. The graph is connected. With `count` = m, a vertex and its neighbours are the m + 1
+    corners of a simplex (m = 2: a triangle). Each edge occurs once, its lower vertex first, and the edges are sorted.
     """
     places = y / np.asarray(spacing)
     edges = [np.empty((0, 2), dtype=np.intp)]
@@ -156,7 +156,8 @@ MAX_LAZY_SEARCHES = 30  # after so many searches all unchecked edges are checked
 def free_path(model: Model, roads: Graph, edges: Ints, start: Array, to_enter: Array, to_leave: Array) -> list[int]:
     """Return the vertices of a path without contacts from a posture to a goal.
 
-    Of the vertices that a straight line without contacts joins to the start, the path begins at the nearest one from which a path exists.
+    A straight line leads from the start to the first vertex. The vertices near the start are tried in order of distance. The first vertex
+    is the nearest one whose line has no contacts and from which a path exists.
 
     Args:
         model: robot and world.

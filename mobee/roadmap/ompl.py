@@ -41,7 +41,7 @@ class ValidityChecker(Protocol):
 
     @property
     def span(self) -> Array:
-        """Ranges of the joints (d,) rad, by which poses are divided for OMPL."""
+        """Ranges of the joints (d,) rad; OMPL gets poses as (q - low) / span."""
 
     @property
     def box(self) -> Array:
@@ -91,8 +91,8 @@ class Free:
 class Grown:
     """A roadmap that OMPL has grown.
 
-    `q`: (V, n) rad, poses of all motors from `prm` and `prm_star`; (V, d), poses of the checker's joints from `grown`. `edges`: (E, 2)
-    indices of the two poses that each edge joins, the lower index first.
+    `q`: the pose of each vertex. The functions `prm` and `prm_star` give poses of all motors, (V, n) rad; the function `grown` gives poses
+    of the checker's joints, (V, d) rad. `edges`: (E, 2) indices of the two poses that each edge joins, the lower index first.
     """
 
     q: Array
@@ -156,8 +156,8 @@ def grown(
         milestones: number of vertices.
         neighbours: number of nearest vertices to which the planner tries to join each vertex; None: the planner's own rule.
         seed: of the samples.
-        resolution: distance between the poses of a motion that OMPL checks one by one, in ranges of the joints; None: the checker checks
-            whole motions.
+        resolution: OMPL checks single poses of each motion at this distance from each other; 1 is the range of a joint. None: the checker
+            checks each motion as a whole (`sound_motion`).
 
     Raises:
         OmplMissing: OMPL is not installed.
@@ -285,8 +285,7 @@ def prm(
         motors: names of motors or parts that move; None: all.
         milestones: least number of poses.
         neighbours: number of nearest poses to which the planner tries to join each pose.
-        rest: (n,) rad, a pose of all motors, at which the motors that do not move stay; the values of the others are not used. None: the
-            home posture.
+        rest: (n,) rad, the positions of the motors that do not move; the values of the other motors are not used. None: the home posture.
         seed: of the samples.
         step: fraction of each motor's range between the checked poses of a motion.
 
@@ -312,8 +311,7 @@ def prm_star(
         model: robot and world.
         motors: names of motors or parts that move; None: all.
         milestones: least number of poses.
-        rest: (n,) rad, a pose of all motors, at which the motors that do not move stay; the values of the others are not used. None: the
-            home posture.
+        rest: (n,) rad, the positions of the motors that do not move; the values of the other motors are not used. None: the home posture.
         seed: of the samples.
         step: fraction of each motor's range between the checked poses of a motion.
 

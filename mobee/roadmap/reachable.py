@@ -53,7 +53,7 @@ def nearest_posture(model: Model, part: str, marker: str, position: Array, q: Ar
 
 
 def body_at(model: Model, part: str, position: Array, q: Array) -> str | None:
-    """Return the name of the link in whose solid shapes `position` (3,) m, root frame, lies in posture q (n,) rad; else None.
+    """Return the name of a link whose solid shapes contain `position` (3,) m, root frame, in the posture q (n,) rad; None if there is none.
 
     Links that the part moves are ignored.
     """

@@ -69,7 +69,7 @@ class Roadmap:
         return self.model.robot.motors if known is None else tuple(known)
 
     def entry(self, q_from: ArrayLike) -> int:
-        """Return the vertex nearest to the posture `q_from` (n,) rad; the distance is over `motors`, each divided by its range."""
+        """Return the vertex nearest to the posture `q_from` (n,) rad: Euclidean distance over `motors`, each divided by its range."""
         return int(self._from(q_from).argmin())
 
     def exit(self, y_goal: ArrayLike) -> int:
@@ -102,7 +102,8 @@ class Roadmap:
             q_from: (n,) rad, the start.
             y_goal: (m,), the goal in the units of the task coordinates.
             free: return only a path without contacts in the present world.  Edges are checked when a path needs them.  If the first line or
-                the last pose has contacts, other near vertices are tried: at the goal those within 1.5 spacings.
+                the last pose has contacts, other vertices are tried: the 24 nearest to the start, and the 8 nearest to the goal, if they
+                are within 1.5 spacings of it.
 
         Raises:
             InvalidValue: the map is empty, or has no vertex near the goal.

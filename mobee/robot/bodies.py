@@ -41,7 +41,7 @@ def _spread(arm: Array) -> Array:
 
 
 def ball_of_water(mass: float) -> Array:
-    """Return the inertia (3, 3) [kg m^2] of a ball of water of this mass [kg]: an estimate for a body with a known mass only."""
+    """Return the inertia (3, 3) [kg m^2] of a ball of water of this mass [kg]: an estimate for a body whose inertia is unknown."""
     radius = (3.0 * mass / (4.0 * np.pi * WATER_DENSITY)) ** (1.0 / 3.0)
     return np.diag(np.full(3, 0.4 * mass * radius**2))
 

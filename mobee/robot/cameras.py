@@ -24,10 +24,10 @@ GRAMMAR = "NAME, NAME=x,y,z or NAME=x,y,z,dx,dy,dz: a link or a marker, a place 
 def cameras_of(robot: Robot, asked: Sequence[str] = ()) -> dict[str, Camera]:
     """Return the cameras that make pictures, by name; a name has only a-z, 0-9 and _, so that it is valid in a key of the bus.
 
-    The first two cameras of the robot's file make pictures.  A robot without cameras, but with the markers left_eye and right_eye, has the
-    cameras "left" and "right" there.  `asked`: further cameras: each text is the name of a camera of the file, or describes a new camera on
-    a marker or link, such as "palm=0,0,0.1" (`mobee.robot.cameras.camera_on`).  Raises InvalidValue or UnknownName for a text that
-    describes no camera.
+    These are the first two cameras of the robot's file. If the file has none, but the markers left_eye and right_eye, they are the camera
+    "left" at left_eye and the camera "right" at right_eye. `asked`: further cameras: each text is the name of a camera of the file, or
+    describes a new camera on a marker or link, such as "palm=0,0,0.1" (`mobee.robot.cameras.camera_on`).  Raises InvalidValue or
+    UnknownName for a text that describes no camera.
     """
     own = _named(robot.cameras.values()) or _eyes(robot)
     first = dict(list(own.items())[:OWN])

@@ -51,9 +51,9 @@ def join_robots(
     motors, joints, links, markers, shapes and cameras get the key and "_" as a prefix; the key "" leaves them unchanged. Parts and motors
     are in the order given. The bases become one link, with the name of the first base. Every solid is tested against all solids of the
     other robots, every field (volume that causes a repulsive force) against all their fields; within a robot its own pairs are kept. The
-    joined robot has the largest `least_lever` (`Robot.least_lever`) of all robots; if their values differ, contacts push some robots
-    differently than before. Raises InvalidValue for equal names, for no robots and for a place that is not a pose; UnknownName for a place
-    without a robot.
+    joined robot has the largest `Robot.least_lever` of all robots. This number scales the forces of fields: robots with a smaller value get
+    other forces from contacts than before. Raises InvalidValue for equal names, for no robots and for a place that is not a pose;
+    UnknownName for a place without a robot.
     """
     for key in places or {}:
         if key not in robots:

@@ -30,12 +30,13 @@ def load_robot(
     srdf: str | Path | None = None,
     home: str | None = None,
 ) -> Robot:
-    """Load a shipped robot by name (`mobee.robot.load.shipped_robots`), or the robot of a zero-position .xml, a .urdf or an MJCF file.
+    """Load a shipped robot by name (`mobee.robot.load.shipped_robots`), or a robot from a file.
 
     Args:
-        name_or_path: a shipped name, the path of a file, or with the package mujoco-menagerie a name of MuJoCo Menagerie.
-        field: URDF and MJCF: distance [m] by which fields extend beyond the solids, one field for every solid; a field is a volume that
-            causes a repulsive force; None: no fields.
+        name_or_path: the name of a shipped robot; the path of a file in URDF (.urdf), MJCF or the format of this library (.xml,
+            "zero-position XML", docs/robots.md); or, with the package mujoco-menagerie, a name of MuJoCo Menagerie.
+        field: URDF and MJCF: each solid gets a field, a volume that causes a repulsive force. `field` is the distance [m] by which it
+            extends beyond the solid. None: no fields.
         meshes: URDF and MJCF: "hull" (the default): a mesh becomes its convex hull; "bounding": the smallest primitive around it.
         corners: URDF and MJCF: the largest number of corners of a mesh's hull (64 by default), or "all" for the exact hull.
         srdf: URDF only: the SRDF file; None: an SRDF beside the URDF or in ../srdf, if there is one (docs/robots.md).

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The unit in which the control law counts the position of each motor, and the motor's limit zones.
+"""The unit of each motor's position in the control law, and the motor's limit zones.
 
 The control law computes with angles. A motor that slides has no angle, so its whole range counts as the angle SLIDE_RANGE (200 deg): 1 rad
 is then range / SLIDE_RANGE of its own unit, the metre of a URDF. In this unit a slide of 4 cm and one of 2 m behave in the same manner.
 
-Thresholds of rest, backlash and encoder noise use a smaller unit for slides, FINE (0.25) times the unit of the law. With the unit of the
-law itself, a slide with a range of 35 cm would count as at rest when it is still 2 mm from its goal.
+Three quantities use a smaller unit for slides, FINE (0.25) times the unit of the law: the thresholds for rest, backlash, and encoder noise.
+With the unit of the law itself, a slide with a range of 35 cm would count as at rest when it is still 2 mm from its goal.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def angle_unit(limits: Array, sliding: bool) -> float:
 
 @per_robot
 def motor_units(robot: Robot) -> Array:
-    """Return the motion of each motor that counts as 1 rad in the control law, (n,), read-only.
+    """Return for each motor the distance, in its own unit, that the control law treats as 1 rad, (n,), read-only.
 
     It is 1 rad for a motor that turns, and a length [m] for a slide, as in `mobee.robot.motor_units.angle_unit`.
     """
@@ -54,9 +54,10 @@ def motor_units(robot: Robot) -> Array:
 
 @per_robot
 def fine_units(robot: Robot) -> Array:
-    """Return the motion of each motor that counts as 1 rad in thresholds of rest, backlash and encoder noise, (n,), read-only.
+    """Return for each motor the distance, in its own unit, that equals 1 rad of small quantities, (n,), read-only.
 
-    It is 1 rad for a motor that turns, and for a slide FINE (0.25) times the length [m] of `mobee.robot.motor_units.motor_units`.
+    The small quantities are the thresholds for rest, backlash, and encoder noise. The distance is 1 rad for a motor that turns, and for a
+    slide FINE (0.25) times the length [m] of `mobee.robot.motor_units.motor_units`.
     """
     units = np.array(
         [unit * (FINE if slides(robot, motor) else 1.0) for unit, motor in zip(motor_units(robot), robot.motor_table, strict=True)]
@@ -68,8 +69,8 @@ def fine_units(robot: Robot) -> Array:
 def limit_zones(robot: Robot, width: Array) -> Array:
     """Return the widths of the zones at the lower and the upper limit of each motor, (n, 2), in the unit of the motor.
 
-    In a zone the control law pushes inward. `width` (n,): the width that the gains give, in the unit of the motor. A zone is at most WIDEST
-    (1/4) of the motor's range. If the motor's `zone_ends_at_home` is set, a zone that would include the home position ends there.
+    In a zone the control law pushes inward. `width` (n,): the gain `limit_width`, in the unit of the motor. A zone is at most WIDEST (1/4)
+    of the motor's range. If the motor's `zone_ends_at_home` is set, a zone that would include the home position ends there.
     """
     low, high = robot.limits.T
     widest = np.minimum(width, WIDEST * (high - low))
@@ -81,9 +82,10 @@ def limit_zones(robot: Robot, width: Array) -> Array:
 
 
 def outside_zones(wanted: float, limits: Array, unit: float) -> float:
-    """Return the position nearest to `wanted` outside the limit zones, in which the control law with the default gains pushes inward.
+    """Return the position nearest to `wanted` that is in neither of the motor's two limit zones.
 
-    `wanted`, `limits` (2,) and the result are in the motor's own unit, rad or m. `unit`: the motion of the motor that counts as 1 rad.
+    In a zone, a range beside a limit, the control law pushes the motor inward; its width is here that of the default gains. `wanted`,
+    `limits` (2,) and the result are in the motor's own unit, rad or m. `unit`: the motion of the motor that counts as 1 rad.
     """
     zone = min(LIMIT_WIDTH * unit, WIDEST * float(limits[1] - limits[0]))
     return float(np.clip(wanted, limits[0] + zone, limits[1] - zone))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The pairs of shapes of a robot, or of several on one base, that are tested for contacts.
+"""The pairs of shapes that are tested for contacts, in one robot or in several robots that are joined into one.
 
 Solids and fields follow one rule; a pair is excluded if
 - both shapes are on the same link, or their links are joined (below);
@@ -8,11 +8,11 @@ Solids and fields follow one rule; a pair is excluded if
 - they are fields of the same part: an arm's own fields overlap wherever the arm bends, and its joint limits keep its solids apart.
 
 Joined links: a cluster is a group of joints, each within 5 cm of its parent joint or of a joint on the same link, such as those of the
-shoulder, the elbow with pro-supination, the wrist, the neck or the torso. The shapes at a cluster overlap, since each fills the whole
-cluster. So the link that carries the cluster and all links that its joints move are joined pairwise: chest with the whole shoulder and
-upper arm, upper arm with elbow and forearm, forearm with wrist and hand.
-So hands and forearms are tested against torso, head and the other arm, and only pairs that overlap in every pose are excluded.
-If a robot file has adjacency="listed", only pairs in <ignore> tags are excluded, so that `write_xml` can keep the pairs of any robot.
+shoulder, the elbow with pro-supination, the wrist, the neck or the torso. A cluster connects the link that carries it and all links that
+its joints move. The shapes of these links overlap at the cluster, since each fills the whole cluster. So each pair of these links counts as
+joined: chest with the whole shoulder and upper arm, upper arm with elbow and forearm, forearm with wrist and hand. So hands and forearms
+are tested against torso, head and the other arm, and only pairs that overlap in every pose are excluded. If a robot file has
+adjacency="listed", only pairs in <ignore> tags are excluded, so that `write_xml` can keep the pairs of any robot.
 """
 
 from __future__ import annotations
@@ -30,9 +30,10 @@ MAX_NAMED = 4  # joints of a cluster that a reason lists
 
 
 def joined_links(joints: Sequence[Joint]) -> dict[LinkPair, str]:
-    """Return the pairs of links that meet in one cluster of joints and so are not tested for contacts, each with the reason as text.
+    """Return the pairs of links that one cluster of joints connects, and which are therefore not tested for contacts, with the reasons.
 
-    A cluster is a group of joints of which each is within CLUSTER (5 cm) of its parent joint or of a joint on the same link.
+    A cluster is a group of joints that are close together: each joint after the first is less than CLUSTER (5 cm) from its parent joint, or
+    from a joint on the same link.
     """
     clusters = _clusters(joints)
     joined: dict[LinkPair, str] = {}
@@ -116,9 +117,9 @@ def merged(*rules: Mapping[LinkPair, str]) -> dict[LinkPair, str]:
 def joined_pairs(bodies: Sequence[Robot], starts: Sequence[int], role: str) -> Ints:
     """Return the tested pairs of shapes of one role ("solid" or "field") of several joined robots, (p, 2), sorted.
 
-    A field is a volume that causes a repulsive force. The result has the tested pairs of each robot itself, and all pairs of shapes of two
-    different robots, unless both shapes are on the common base. `bodies`: the robots; their links have the indices of the joined robot.
-    `starts`: for each robot, the index of its first shape in the joined robot.
+    A field is a volume that causes a repulsive force. The pairs are those of each single robot, and all pairs of shapes of two different
+    robots. A pair is left out if both shapes are on link 0, the base that the robots share. `bodies`: the robots, already with the link
+    numbers of the joined robot. `starts`: for each robot, the index of its first shape in the joined robot.
     """
     pairs = [
         (body.solid_pairs if role == "solid" else body.field_pairs).reshape(-1, 2) + start
@@ -140,9 +141,10 @@ def joined_pairs(bodies: Sequence[Robot], starts: Sequence[int], role: str) -> I
 def joined_untested(bodies: Sequence[Robot], shapes: Sequence[Shape], pairs: Sequence[Ints]) -> dict[LinkPair, str]:
     """Return the pairs of links of several joined robots that are never tested for contacts, each with the reason.
 
-    They are the untested pairs of the single robots, except those that are tested in the joined robot: a pair with the common base can be
-    untested in one robot and tested in another. `bodies`: the robots; their links have the indices of the joined robot. `shapes`: shapes of
-    the joined robot. `pairs`: its tested pairs of solids and of fields, each (p, 2).
+    They are the untested pairs of the single robots, except those that are tested in the joined robot: the robots share the base, so a link
+    that is not tested against the base of its own robot can be tested against the shapes that another robot has there. `bodies`: the
+    robots; their links have the indices of the joined robot. `shapes`: shapes of the joined robot. `pairs`: its tested pairs of solids and
+    of fields, each (p, 2).
     """
     tested = link_pairs(shapes, *pairs)
     return merged(*({pair: reason for pair, reason in body.untested.items() if pair not in tested} for body in bodies))

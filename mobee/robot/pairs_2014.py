@@ -6,13 +6,14 @@ it descends the tree from A and from each sibling of A; the rules differ in wher
 against each other. Solids of neighbours are not tested against each other if both elements are of one part, or one carries the other, or
 both have the same parent.
 
-adjacency="published_2014" is the rule of the program (kailfrank/MoBeE, KinTreeNode::ignoreAdjacentPairs). After a branch of the search has
-passed both a link under a joint and a joint under a link, each with a solid, it reaches only elements with the tag of A, and ends before
-the next element with the other tag.
+adjacency="published_2014" is the rule of the program (kailfrank/MoBeE, KinTreeNode::ignoreAdjacentPairs). A branch of the search first
+descends until it has passed two elements that have a solid: a link whose parent is a joint, and a joint whose parent is a link. From then
+on it ends before the first element with another tag than A. A, its siblings and elements directly below the root do not count for this.
 
-adjacency="recorded_2014" is an earlier interpretation, with which this project recorded its results on icub_2014. A branch ends when it
-has passed one link and one joint with a shape of the role in question (solid or field). By this rule no field of icub_2014 touches another
-field at home; by the rule of the program the forearm's field is 3 mm deep in the field of the thumb.
+adjacency="recorded_2014" is an earlier interpretation, with which this project recorded its results on icub_2014. A branch of the search
+ends after it has reached one link and one joint that have a shape of the role in question (solid or field); A itself does not count. By
+this rule no field of icub_2014 touches another field at home; by the rule of the program the forearm's field is 3 mm deep in the field of
+the thumb.
 """
 
 from __future__ import annotations
@@ -61,9 +62,9 @@ def published_pairs(elements: Sequence[Element], hosts: Sequence[int], shapes: S
 def published_untested(elements: Sequence[Element], hosts: Sequence[int], shapes: Sequence[Shape], rule: Rule) -> dict[LinkPair, str]:
     """Return the pairs of links that a rule of 2014 never tests for contacts, each with the reason.
 
-    A pair of links is never tested if the rule for solids excludes all pairs of their elements. Only elements of a link that have a solid
-    count; if none has a solid, all elements of the link count. `hosts`: for each shape the index of its element. `rule`: "published_2014":
-    the rule of the program published in 2014; "recorded_2014": this project's earlier interpretation of that rule.
+    A pair of links is never tested if the rule for solids excludes all pairs of their elements. Of a link with solids, only the elements
+    with a solid are examined; of a link without solids, all its elements. `hosts`: for each shape the index of its element. `rule`:
+    "published_2014": the rule of the program published in 2014; "recorded_2014": this project's earlier interpretation of that rule.
     """
     solid = _bearing(hosts, shapes, "solid")
     near = _near(elements, hosts, shapes, "solid", rule)
@@ -108,8 +109,9 @@ def neighbours(elements: Sequence[Element], bearing: Collection[int]) -> set[fro
     """Return the pairs of neighbours in the tree by the rule "published_2014", as indices of elements; element 0 is the root of the file.
 
     `bearing`: the elements that have a solid. For each element A, a search descends the tree from A and from each sibling of A; the
-    elements that it reaches are neighbours of A. After a branch of the search has passed both a link under a joint and a joint under a
-    link, each with a solid, it reaches only elements with the tag of A, and ends before the next element with the other tag.
+    elements that it reaches are neighbours of A. A branch of the search first descends until it has passed two elements that have a solid:
+    a link whose parent is a joint, and a joint whose parent is a link. From then on it ends before the first element with another tag than
+    A. A, its siblings and elements directly below the root do not count for this.
     """
     children: dict[int, list[int]] = {}
     for index, element in enumerate(elements):
@@ -148,8 +150,8 @@ def recorded_neighbours(elements: Sequence[Element], bearing: Collection[int]) -
     """Return the pairs of neighbours in the tree by the rule "recorded_2014", as indices of elements.
 
     `bearing`: the elements that have a shape of the role in question (solid or field). For each element A, a search descends the tree from
-    A and from each sibling of A; the elements that it reaches are neighbours of A. A branch of the search ends when it has passed a link
-    and a joint with such a shape.
+    A and from each sibling of A; the elements that it reaches are neighbours of A. A branch of the search ends after it has reached one
+    link and one joint that are in `bearing`; A itself does not count.
     """
     children: dict[int, list[int]] = {}
     for index, element in enumerate(elements):
@@ -178,9 +180,9 @@ def recorded_neighbours(elements: Sequence[Element], bearing: Collection[int]) -
 def near_root(parents: Sequence[int], tags: Sequence[str], index: int) -> bool:
     """Return whether MoBeE of 2014 counted an element as the base (KinTreeNode::isNearRoot), so that it ignored contacts with the world.
 
-    A search climbs from the element over one change from link to joint and one change from joint to link, and then over elements with the
-    same tag as the first element. An element is near the root if this search arrives at the root. `parents`: for each element the index of
-    its parent, -1 if that is the root. `tags`: for each element "link" or "joint". `index`: index of the element.
+    Along the path from the element up to the root, the tag changes between link and joint. The element is near the root if the tag changes
+    at most twice. A third change is allowed only at the last element of the path, whose parent is the root. `parents`: for each element the
+    index of its parent, -1 if that is the root. `tags`: for each element "link" or "joint". `index`: index of the element.
     """
     here, link, joint = index, False, False
     while parents[here] >= 0:

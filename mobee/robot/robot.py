@@ -45,9 +45,9 @@ class Motor:
     `part`: name of its part. `limits`: (2,) rad. `home`: position at home, rad. `joints`: (index, scale, offset) of each driven joint.
     `max_velocity` (rad/s; the gate, which checks commands, enforces it), `max_acceleration` (rad/s^2), `max_torque` (N m).
 
-    `zone_ends_at_home`: concerns a home position in a limit zone, a range near a limit in which the control law pushes inward. True: the
-    zone ends at home, so that the robot rests there. False: the law pushes the motor away from home. It is True for motors of a URDF or
-    MJCF file.
+    `zone_ends_at_home`: matters only if the home position is in a limit zone. A limit zone is a range near a limit, in which the control
+    law pushes inward. True: the zone ends at home, so that the robot rests there. False: the law pushes the motor away from home. It is
+    True for motors of a URDF or MJCF file.
     """
 
     name: str
@@ -163,10 +163,10 @@ class Robot:
         bodies: the masses, at most one for each link, in the order of the links; () if the file has none.
         visuals: the drawn surfaces of the links, if these are not their solids.
         cameras: the cameras in the robot's file, by name; `mobee.robot.cameras.cameras_of` chooses which ones make pictures.
-        least_lever: m. A contact of fields pushes the motors along J^T (thesis eq. 5.11), where J has the derivatives of its depth with
-            respect to the motor positions; the norm |J| is its lever. 0: the push is proportional to J^T, so a contact with a short lever
-            hardly pushes. Above 0: it is proportional to LEVER^2 J^T / (|J|^2 + least_lever^2), with LEVER = 0.5 m
-            (`mobee.model.levers`).
+        least_lever: m. A contact of fields pushes the motors along J^T (thesis eq. 5.11). J contains the derivatives of the contact's
+            depth with respect to the motor positions; the norm |J| is the lever of the contact. 0: the push is proportional to J^T, so a
+            contact with a short lever hardly pushes. Above 0: it is proportional to LEVER^2 J^T / (|J|^2 + least_lever^2), with
+            LEVER = 0.5 m (`mobee.model.levers`).
     """
 
     name: str

@@ -30,6 +30,10 @@ class Actions:
     """The state of the present or last action of each part of a plant.
 
     `parts`: a table with a row for each part (`mobee._core.plant.PART`), which the plant's ticks change.
+
+    Args:
+        robot: the robot.
+        alive: (n,) whether each motor is active, that is, may move; a part without active motors cannot act.
     """
 
     __slots__ = ("_alive", "_limits", "_next_check", "_parts", "_row", "_start", "_under_way", "_verdict", "parts")
@@ -118,7 +122,10 @@ class ReachesUnderWay:
 
     @property
     def reaching(self) -> tuple[str, ...]:
-        """The names of the markers on whose hands the targets exert no repulsive force at present, because they reach or are exempt."""
+        """The names of the markers that a force pulls to the target at present, and of the marker `exempt`.
+
+        The targets exert no repulsive force on the hands that carry these markers.
+        """
         drawn = [reach.name for reach in self._under_way.values() if reach.end is None]
         return tuple(dict.fromkeys(drawn if self.exempt is None else [*drawn, self.exempt]))
 
@@ -163,8 +170,11 @@ class ReachesUnderWay:
     def ended(self, part: str, end: Outcome, pose: Pose) -> bool:
         """Record that a part has settled or timed out; return whether the part must now return to its attractor.
 
-        `end`: the outcome. `pose`: the pose of the robot at that time. The first call for a reach ends the force: it returns True, or False
-        if the part stays where it is. The second call ends the return to the attractor: it returns False.
+        A reach has one or two motions. The first one is the pull to the target. When it has ended, this method ends the force. If the part
+        stays where it is (`stay`), the reach has then ended, and False is returned; else True. The second motion is the return to the
+        attractor; when it has ended, the reach has ended, and False is returned.
+
+        `end`: the outcome of the motion. `pose`: the pose of the robot at its end.
         """
         reach = self._under_way[part]
         if reach.end is None and self._target is not None:
@@ -186,7 +196,10 @@ class ReachesUnderWay:
         return self._ended[part]
 
     def after(self, part: str) -> Outcome | None:
-        """Return, only once, the outcome of the last motion of the part's last reach; None later, or if no reach has ended."""
+        """Return the outcome of the last motion of a part's reach that has ended; None if there is none, or if it was returned before.
+
+        This motion is the return to the attractor, or the pull to the target if the part stays where it is.
+        """
         return self._settled.pop(part, None)
 
     def drop(self, part: str) -> None:

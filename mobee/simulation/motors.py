@@ -28,9 +28,9 @@ PerMotor = float | Sequence[float]  # one number for all, or one for each motor 
 class MotorParameters:
     """Parameters of the simulated motors; with the defaults the simulation reproduces the published findings.
 
-    lag, delay, backlash and friction are one number, or one for each motor in the order of `robot.motors`. One number for all applies to
-    rotary motors; backlash and friction are then scaled by the range of sliding motors (`mobee.robot.motor_units`). Numbers for each motor
-    are in its own unit, rad or m.
+    lag, delay, backlash and friction are one number, or one for each motor in the order of `robot.motors`. If backlash or friction is one
+    number, rotary motors have this value; for a sliding motor it is multiplied by a length [m] that is proportional to the motor's range
+    (`mobee.robot.motor_units.fine_units`). Numbers for each motor are in its own unit, rad or m.
 
     Attributes:
         lag: s, time constant of the first-order response to a velocity command.
@@ -98,19 +98,17 @@ class MotorParameters:
 class Braking:
     """Limits the commands of n motors tick by tick, so that the motors can always brake before their position limits.
 
-    `velocity` (n,) rad/s and `position` (n,) rad are the current commands; the methods change them in place.
+    `velocity` (n,) rad/s and `position` (n,) rad are the current commands, at first 0; the methods change them in place.
+
+    Args:
+        lower: (n,) rad, position limits.
+        upper: (n,) rad, position limits.
+        fastest: (n,) rad/s, largest velocities.
+        change: (n,) rad/s, largest change of the velocity in a tick.
+        dt: duration of a tick [s].
     """
 
     def __init__(self, lower: Array, upper: Array, fastest: Array, change: Array, dt: float) -> None:
-        """Start with all commands 0.
-
-        Args:
-            lower: (n,) rad, position limits.
-            upper: (n,) rad, position limits.
-            fastest: (n,) rad/s, largest velocities.
-            change: (n,) rad/s, largest change of the velocity in a tick.
-            dt: duration of a tick [s].
-        """
         self._bounds = [np.array(one, dtype=np.float64) for one in (lower, upper, fastest, change)]
         self._count = len(self._bounds[0])
         self.velocity, self.position = np.zeros(self._count), np.zeros(self._count)
@@ -119,7 +117,10 @@ class Braking:
         self._core = core.calls()
 
     def to_velocity(self, wanted: Array, q: Array) -> None:
-        """Change `velocity` by one tick towards `wanted` (n,) rad/s, no faster than motors at q (n,) rad can brake before their limits."""
+        """Change `velocity` by one tick towards `wanted` (n,) rad/s.
+
+        Before that, `wanted` is limited to velocities from which motors at q (n,) rad can stop before their position limits.
+        """
         self._core.to_velocity(self._here, numbers(wanted, self._count), numbers(q, self._count))
 
     def to_position(self, wanted: Array) -> None:
@@ -142,18 +143,25 @@ _HOLD, _TORQUE = core.MODES.index("hold"), core.MODES.index("torque")
 
 
 class Motors:
-    """All motors of a robot, advanced together; arrays are (n,) in the order of `robot.motors`, and copies.
+    """All motors of a robot, advanced together. The properties return copies of arrays (n,), in the order of `robot.motors`.
 
-    Either call `move`; or, in each substep, call `drive` and then `adopt`, between which a physics engine computes the positions of the
-    joints.
+    Without a physics engine, call `move`, which advances motors and joints. With one, do three things in each substep: call `drive`, let
+    the engine compute the positions of the joints, and call `adopt` with them.
+
+    At the start the robot rests, and every motor is in mode "hold", in which it keeps its position.
+
+    Args:
+        robot: the robot.
+        parameters: parameters of the motors.
+        seed: seed of the encoder noise, a whole number, at least 0.
+        q: (n,) rad, positions at the start.
+        alive: (n,) whether each motor is active; the others never move, and their encoders have no noise. None: all motors are active.
+
+    Raises:
+        InvalidValue: `q` has another shape, or the seed or the parameters are not valid.
     """
 
     def __init__(self, robot: Robot, parameters: MotorParameters, seed: int, q: Array, alive: NDArray[np.bool_] | None = None) -> None:
-        """Start at rest at q (n,) rad, with every motor in hold (it keeps its position).
-
-        `seed`: of the encoder noise. `alive`: (n,) whether each motor is active; the others never move, and their encoders have no noise.
-        None: all motors are active.
-        """
         n = len(robot.motor_table)
         if np.shape(q) != (n,):
             raise InvalidValue(f"q of shape {np.shape(q)}: must be ({n},), a position for every motor of {robot.name}")
@@ -205,12 +213,12 @@ class Motors:
 
     @property
     def q(self) -> Array:
-        """Positions of the joints, behind the backlash, (n,) rad."""
+        """Positions of the joints, on the output side of the backlash, (n,) rad."""
         return self.state["q"].copy()
 
     @property
     def velocities(self) -> Array:
-        """Velocities of the joints, behind the backlash, (n,) rad/s."""
+        """Velocities of the joints, on the output side of the backlash, (n,) rad/s."""
         return self.state["velocity"].copy()
 
     @property
@@ -224,7 +232,7 @@ class Motors:
 
     @property
     def motor_velocities(self) -> Array:
-        """Velocities of the motors before the backlash, (n,) rad/s."""
+        """Velocities of the motors, on the input side of the backlash, (n,) rad/s."""
         return self.state["motor_velocity"].copy()
 
     @property
@@ -263,9 +271,10 @@ class Motors:
                 self._core.enter(self.address, motor, code)
 
     def drive(self, dt: float) -> Array:
-        """Advance the motors by one substep of dt [s], before the backlash; return the velocities that they give the joints, (n,) rad/s.
+        """Advance the motors by one substep of dt [s]; return the velocities that they give the joints, (n,) rad/s.
 
-        The velocity is zero while a motor moves within the backlash.
+        The joints themselves do not move; `adopt` sets their positions. The velocity of a joint is zero while its motor moves within the
+        backlash.
         """
         self.begin_substeps(dt)
         self._core.drive(self.address, dt)
@@ -273,22 +282,26 @@ class Motors:
         return velocity
 
     def move(self, substeps: int, dt: float) -> None:
-        """Advance motors and joints by `substeps` substeps of dt [s] with constant load; only the hard stops block the joints."""
+        """Advance motors and joints by `substeps` substeps of dt [s]; nothing blocks the joints except the hard stops at their limits.
+
+        The commands and the `load` are constant during these substeps.
+        """
         self.begin_substeps(dt)
         self._core.move(self.address, substeps, dt)
 
     def adopt(self, q: Array) -> None:
         """Set the positions of the joints, q (n,) rad, at the end of a substep, as a physics engine has computed them.
 
-        The motor stays within the backlash of its joint, so it does not move ahead of a blocked joint. In torque mode it follows the joint.
+        The motors are then adapted to these positions. A motor that is farther from its joint than the backlash allows is moved back to
+        this bound; so a blocked joint also stops its motor. In torque mode a motor takes the position and the velocity of its joint.
         """
         self._core.adopt(self.address, numbers(q, len(self.state)), self._dt)
 
     def encoders(self, k: int, dt: float, where: slice = slice(None)) -> Array:
         """Return the encoder values at tick k: the positions of the joints plus white noise, rad, of the motors `where`.
 
-        `dt`: duration of a tick [s]; the density of the noise does not depend on it. The noise depends only on the seed, the tick and the
-        motor.
+        `dt`: duration of a tick [s]; the standard deviation of the noise is proportional to 1 / sqrt(dt), so that its power spectral
+        density is the same for every dt. The random numbers depend only on the seed, the tick and the motor.
         """
         noisy = self.q
         self._core.read(self.address, k, self.noise(dt).tobytes(), address(noisy))

@@ -48,12 +48,12 @@ class PlantSettings(Settings):
             of the touching part only.
         modality: kind of the commands: "velocity", "position" or "torque".
         speed_scale: share of the motors' largest speed that is used, above 0, at most 1.
-        contact_forces: whether contacts of fields, volumes around the solids, cause repulsive forces; False: the law's contact force f_coll
-            is zero.
+        contact_forces: whether the law has repulsive forces from contacts of fields (larger volumes around the solids); False: the contact
+            force f_coll is zero.
         active: names or patterns of parts and motors that move; None: all.  The others are rigid at home, without noise, and need no
             computing time.
-        command_age: number of ticks between the reading of the encoders and the start of the motion by the command computed from them; the
-            live system has 1.
+        command_age: delay of the commands, in ticks: in tick k the motors move by the command that was computed from the encoders of tick
+            k - `command_age`; the live system has 1.
         hashed: whether a hash of all encoder values is computed (`OfflinePlant.hash`).
         terms: further forces of the law, as Python functions, which are called in every tick.
     """
@@ -193,7 +193,10 @@ class OfflinePlant:
 
     @property
     def reaching(self) -> tuple[str, ...]:
-        """The names of the markers that are reaching at present: the targets exert no repulsive force on their hands."""
+        """The names of the markers that are reaching at present, or for which `act` was called with `reaching`.
+
+        The targets exert no repulsive force on the hands that carry these markers.
+        """
         return self._reaches.reaching
 
     @property
@@ -203,7 +206,10 @@ class OfflinePlant:
 
     @property
     def may_edit(self) -> bool:
-        """Whether a tick may change the world or the reaching markers, because a reach is in progress or a callback of `every` is set."""
+        """Whether ticks of this plant can change the world, or the set of markers that are reaching.
+
+        This is possible while a reach is in progress, or while a callback of `every` is set.
+        """
         return bool(self._reaches.running) or self._callback is not None
 
     @property
@@ -303,8 +309,8 @@ class OfflinePlant:
     def advance(self) -> list[tuple[str, Outcome]]:
         """Run until at least one acting part has ended; return the names and outcomes of the parts that ended, in the robot's order.
 
-        For a reach, the outcome is that of the return to the attractor, or of the pull if the part stays; `reached` returns the outcome of
-        the whole reach. Raises InvalidValue if no part is acting.
+        For a reach with `stay` False, the outcome is that of the return to the attractor; with `stay` True, that of the motion towards the
+        target. `reached` returns the outcome of the whole reach. Raises InvalidValue if no part is acting.
         """
         return finished(self.advancing())
 
@@ -325,14 +331,15 @@ class OfflinePlant:
         return [(part, self._reaches.after(part) or self._outcome(part)) for part in done]
 
     def tick(self) -> None:
-        """Run one control tick: read the encoders, compute model and controller, move the motors by the command of the age `command_age`.
+        """Run one control tick: read the encoders, compute model and controller, move the motors.
 
-        Actions that end in this tick are not returned by a later `advance`.
+        The motors move by the command that was computed `command_age` ticks ago (`PlantSettings`). If an action ends in this tick, a later
+        `advance` does not return its outcome.
         """
         finished(self._ticks_of(1))
 
     def run(self, ticks: int) -> Trace:
-        """Run `ticks` ticks, also if actions end earlier; return the trace, with one row per tick."""
+        """Run exactly `ticks` ticks; return the trace, with one row per tick. The end of an action does not stop the run."""
         return finished(self.running(ticks))
 
     def running(self, ticks: int) -> Work[Trace]:
@@ -377,8 +384,9 @@ class OfflinePlant:
     def conclude(self) -> Array:
         """Update the plant after the compiled core has run ticks; return one row per recorded tick, (ticks, 3 n + 2).
 
-        A row has the encoders, joint positions and velocities (n each), and the depths [m] of the deepest contacts of solids and of fields;
-        there are no rows if the ticks were not recorded. Raises ActionInterrupted if the motors' state is no longer finite.
+        A row has the encoders, joint positions and velocities (n each), then the depths [m] of the deepest contact of solids and of the
+        deepest contact of fields (volumes that cause repulsive forces). There are no rows if the ticks were not recorded. Raises
+        ActionInterrupted if the motors' state is no longer finite.
         """
         rows, done, lost = self._runner.results()
         if done:

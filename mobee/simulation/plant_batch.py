@@ -47,11 +47,11 @@ class PlantBatch:
         self._core.aim_many(self._addresses[which].tobytes(), len(which), np.ascontiguousarray(attractors).tobytes())
 
     def run(self, which: Ints, ticks: int) -> Array:
-        """Run `ticks` ticks of the plants `which` (k,), also if actions end earlier; return the depths of their deepest contacts.
+        """Run exactly `ticks` ticks of each of the plants `which` (k,); return the depths of their deepest contacts.
 
-        The result is (k, 2) m, of contacts of solids and of fields (volumes that cause repulsive forces) during these ticks; 0 without
-        contacts. Raises BatchInterrupted if a plant's state is not finite; the attribute `results` of the exception then holds the rows of
-        the other plants.
+        The end of an action does not stop the run. The result is (k, 2) m, of contacts of solids and of fields (volumes that cause
+        repulsive forces) during these ticks; 0 without contacts. Raises BatchInterrupted if a plant's state is not finite; the attribute
+        `results` of the exception then holds the rows of the other plants.
         """
         chosen = [self.plants[number] for number in which.tolist()]
         if not all([plant.prepare_batch(self._deepest[number]) for number, plant in zip(which.tolist(), chosen, strict=True)]):

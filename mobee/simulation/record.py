@@ -22,8 +22,9 @@ DIGITS = 9  # decimals of lengths and angles: the same file read on another mach
 def described(robot: Robot, world: World, **more: Any) -> dict[str, Any]:
     """Return a description of a simulated robot as plain JSON values.
 
-    Keys: "robot" (name), "digest" (16 hex digits of all its properties that have an effect), "world" (the present objects by name), and the
-    keys of `more`: plain values, or dataclasses of numbers, which become dicts.
+    Keys: "robot" (name), "digest" (16 hex digits, a hash of the robot's properties without those that do not affect the simulation, such as
+    its visuals and cameras), "world" (the present objects by name), and the keys of `more`: plain values, or dataclasses of numbers, which
+    become dicts.
     """
     held = {entry.name: getattr(robot, entry.name) for entry in fields(robot) if entry.name not in _WITHOUT_EFFECT}
     content = {name: _plain(value) for name, value in held.items() if name not in _ADDED_LATER or value}

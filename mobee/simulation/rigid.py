@@ -36,16 +36,17 @@ def living(robot: Robot, active: Sequence[str] | None) -> NDArray[np.bool_]:
 
 
 def stiffened(robot: Robot, alive: NDArray[np.bool_], keep_parts: bool = False, solids: bool = True, apart: Sequence[int] = ()) -> Robot:
-    """Return a reduced robot in which the motors that are not active are rigid at home; it has the same motors, but fewer links.
+    """Return a reduced robot in which the joints of inactive motors are fixed at home; it has the same motors, but fewer links.
 
     Links whose joints no active motor drives are merged into their parents. Contacts that no active motor can change are left out. The
     forces on active motors stay equal up to rounding, and exactly equal if all motors are active. Markers, masses and attached objects are
-    left out. The result is cached while it is in use, so that plants share it.
+    left out. Calls with equal arguments return the same object as long as it is in use.
 
     Args:
         robot: the robot.
         alive: (n,) whether each motor is active.
-        keep_parts: whether links of different parts are not merged, so that a contact force can act on the motors of one part only.
+        keep_parts: whether links of different parts are not merged; this is needed if a contact force acts only on the motors of the part
+            that touches (`PlantSettings.propagate` "part").
         solids: whether solids are kept; False: only fields, the volumes that cause repulsive forces, are kept.
         apart: indices of further links that are not merged.
     """

@@ -32,7 +32,10 @@ Work = Generator[int, None, T]
 
 
 def finished(work: Work[T]) -> T:
-    """Run a computation of one plant, such as `OfflinePlant.advancing` returns, to its end in the compiled core; return its result."""
+    """Run the compiled core for each step that the generator `work` yields, until it ends; return the return value of the generator.
+
+    Such generators come from `OfflinePlant.advancing` and `OfflinePlant.running`.
+    """
     run = core.calls().run
     try:
         while True:
@@ -51,7 +54,7 @@ class Trace:
     Attributes:
         encoders: (ticks, n) rad.
         q: (ticks, n) rad, positions of the joints.
-        velocity: (ticks, n) rad/s, the velocities that the controller integrates.
+        velocity: (ticks, n) rad/s, the velocities in the controller's own state, which are computed and not measured.
         solid: (ticks,) m, depth of the deepest contact of solids at the pose of the encoders; 0 without contacts.
         field: (ticks,) m, depth of the deepest contact of fields, volumes that cause repulsive forces; 0 without contacts.
     """
@@ -76,19 +79,21 @@ class Trace:
 
 
 class Runner:
-    """Runs the ticks of one plant in the compiled core; holds the commands not yet in effect, and encoders and forces of the last tick."""
+    """Runs the ticks of one plant in the compiled core.
+
+    It holds the commands that the motors have not received yet, and the encoders and forces of the last tick.
+
+    Args:
+        controller: of the robot.
+        motors: of the robot.
+        alive: (n,) whether each motor is active.
+        dt: duration of a tick [s].
+        command_age: delay of the commands, in ticks: in tick k the motors move by the command computed from the encoders of tick
+            k - `command_age`.
+        parts: the state of each part's action, a row for each (`mobee._core.plant.PART`).
+    """
 
     def __init__(self, controller: Controller, motors: Motors, alive: NDArray[np.bool_], dt: float, command_age: int, parts: Table) -> None:
-        """Prepare the structure that the core runs.
-
-        Args:
-            controller: of the robot.
-            motors: of the robot.
-            alive: (n,) whether each motor is active.
-            dt: duration of a tick [s].
-            command_age: number of ticks between the reading of the encoders and the motion by the command computed from them.
-            parts: the state of each part's action, a row for each (`mobee._core.plant.PART`).
-        """
         n = len(alive)
         self._controller, self._motors, self._alive, self._dt = controller, motors, alive, dt
         self._cut = controller.propagate == "part"
@@ -135,7 +140,8 @@ class Runner:
         """Prepare the next run of up to `most` ticks; return the address of the structure that the core must run.
 
         `kept`: whether encoders, joints and contacts of every tick are recorded, see `results`. `solids`: whether contacts of solids are
-        computed too, for this record. `reaching`: names of the markers that reach: targets do not repel their hands.
+        computed too; the record needs them, the forces do not. `reaching`: names of markers; the targets exert no repulsive force on the
+        hands that carry these markers.
         """
         controller, motors, struct = self._controller, self._motors, self._struct
         if self.batch_world is not None:
@@ -161,18 +167,21 @@ class Runner:
 
     @property
     def needs_python(self) -> bool:
-        """Whether Python must compute forces between ticks, so that `prepare` must be called before each run.
+        """Whether Python code is needed between ticks, so that `prepare` must be called before each run.
 
-        This is so in torque mode, and if clients, reaches or Python terms exert forces.
+        It is needed in torque mode, while a force given to `Controller.force` or `Controller.push` acts, while a reach is in progress, and
+        if the law has terms in Python.
         """
         controller = self._controller
         return bool(controller.forced or controller.pushed or controller.reaches or controller.terms or controller.modality == "torque")
 
     def prepare_batch(self, deepest: Array) -> None:
-        """Prepare several runs, one after the other, that `PlantBatch` starts in the present world, without Python between the ticks.
+        """Prepare the structure for runs that `PlantBatch` starts in the core, and during which no Python code is needed.
 
-        `deepest`: (2,) m, depths of the deepest contacts of solids and of fields; the compiled core raises them when a contact in a tick is
-        deeper, and the caller must keep the array alive.
+        It stays prepared for any number of runs, until the world changes or `prepare` is called.
+
+        `deepest`: (2,) m, depths of the deepest contact of solids and of the deepest contact of fields (volumes that cause repulsive
+        forces). The core increases a number when a contact in a tick is deeper. The caller must keep the array alive.
         """
         world = self._controller.model.world.snapshot
         if self.batch_world is not world:

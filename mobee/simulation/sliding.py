@@ -45,7 +45,7 @@ class SlidingObject:
         name: name of an upright cylinder in the plant's world with the role "ghost", so that the controller keeps no distance from it.
         support: name of the box on which it stands.
         friction: coefficient of friction between object and support.
-        area: ((x low, x high), (y low, y high)) in m, root frame, within which its centre stays; None: the top of the support.
+        area: ((x low, x high), (y low, y high)) in m, root frame; the object falls when its centre leaves it; None: the top of the support.
 
     Raises:
         UnknownName: the world has no such object.

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Vision: lenses, imperfect cameras, positions of objects from two cameras, and calibration of the cameras on the robot's own hand."""
+"""Vision: lenses, imperfect cameras, positions of objects from two cameras, and calibration with pictures of the robot's own hand."""

@@ -27,7 +27,7 @@ def aligned(gray: NDArray[np.float32], lens: Lens, pattern: Array, margin: int, 
         gray: (height, width), the picture.
         lens: lens of the camera.
         pattern: (c, c), the brightness of square cells.
-        margin: number of cells of `pattern` around the square whose corners are searched.
+        margin: width of the border of `pattern`, in cells; the result is the corners of the square inside this border.
         corners: (4, 2) px, first values of the corners, column and row, clockwise from the upper left.
     """
     from scipy.ndimage import gaussian_filter, map_coordinates  # 0.3 s, and only the alignment needs it

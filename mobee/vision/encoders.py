@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The encoders at the stamp of a picture, from the readings around it."""
+"""Estimates the encoders at the time stamp of a picture, from the readings shortly before and after it."""
 
 from __future__ import annotations
 
@@ -45,9 +45,10 @@ class Readings:
             rows.append((t, q))
 
     def at(self, t: float) -> tuple[Array, Array, int]:
-        """Return the encoders (n,) rad and velocities (n,) rad/s of all motors at time t [s], and the number of readings used.
+        """Return the encoders (n,) rad and velocities (n,) rad/s of all motors at time t [s], and the smallest number of readings.
 
-        This number is the smallest one of all parts. Raises InvalidValue if a part has fewer than two readings within 0.035 s of t.
+        For each part, the readings within 0.035 s of t are used; the number is that of the part with the fewest of them. Raises
+        InvalidValue if a part has fewer than two.
         """
         q, dq, fewest = np.zeros(self._motors), np.zeros(self._motors), KEPT
         for part, where in self._parts.items():

@@ -22,9 +22,10 @@ UPWARDS = np.array([[1.0], [-1.0], [1.0]])  # a camera's right, down and ahead a
 
 
 class Sensor:
-    """Turns the brightness in the plane ahead of a camera into a picture, with the distortion of its lens and the noise of its chip.
+    """Computes the picture of an imperfect camera from exact renderings: adds the distortion of its lens and the noise of its chip.
 
-    A pixel is the mean of `settings.samples` samples, at different places within the pixel and at different times of the exposure.
+    A pixel is the mean of `settings.samples` samples. Each sample is rendered at another time of the exposure and at another place within
+    the pixel.
     """
 
     def __init__(self, settings: CameraSettings) -> None:
@@ -54,21 +55,23 @@ class Sensor:
         return self._settings.exposure * ((np.arange(count) + 0.5) / count - 0.5)
 
     def view(self, sample: int, position: Array, rotation: Array) -> View:
-        """Return the view in which sample number `sample` is drawn, for a camera at `position` (3,) m with `rotation` (3, 3), root frame.
+        """Return the view (the renderer's camera, without distortion) with which sample number `sample`, from 0, is drawn.
 
-        The columns of the rotation are the directions right, down and ahead of the camera.
+        `position` (3,) m and `rotation` (3, 3): those of the camera in the root frame. The columns of the rotation are the directions
+        right, down and ahead of the camera.
         """
         left, top = self._corners[sample]
         return View(rotation.T * UPWARDS, np.array([left, -top]), self._scale, self._width, self._height, position)
 
     def pixels(self, sample: int) -> Pixels:
-        """Return the pixels of the view of sample number `sample` that give the height * width pixels of the picture, row by row."""
+        """Return, for sample number `sample`, one pixel of its `view` for each of the height * width pixels of the picture, row by row."""
         return self._pixels[sample]
 
     def develop(self, light: Floats, rng: np.random.Generator) -> Picture:
-        """Return the picture (height, width, 3) with noise, bytes red, green, blue.
+        """Return the picture (height, width, 3) from the light of an exposure, with noise: bytes in the order red, green, blue.
 
-        `light`: (height * width, 3), the sum of the brightness (0 to 255) of all samples. `rng`: draws the noise.
+        `light`: (height * width, 3), for each pixel the brightness (0 to 255), summed over the samples (`CameraSettings.samples`) of the
+        exposure. `rng`: draws the noise.
         """
         settings = self._settings
         electrons = light * np.float32(settings.full_well / settings.gain / 255.0 / settings.samples)
@@ -104,8 +107,8 @@ class Cameras:
     def expose(self, name: str, postures: Sequence[Array]) -> Picture:
         """Return the picture of a camera (height, width, 3), bytes red, green, blue; `name`: name of the camera.
 
-        `postures`: positions of all motors (n,) rad in the simulation, at each of the `moments`. The robot is drawn at these positions plus
-        the offsets `errors.encoders`; so its head is not where the simulated encoders say.
+        `postures`: positions of all motors (n,) rad in the simulation, at each of the `moments`. The offsets `errors.encoders` are added to
+        these positions before the robot is drawn. So the picture shows the head at a posture that differs from the simulated one.
         """
         camera, scene = self._scene.cameras[name], self._scene
         light = np.zeros((self.settings.height * self.settings.width, 3), np.float32)
@@ -116,7 +119,7 @@ class Cameras:
         return self._sensor.develop(light, self._rng)
 
     def shares(self, name: str, postures: Sequence[Array], objects: int) -> Floats:
-        """Return by how much each pixel shows each of the world's first `objects` objects, (height, width, objects), shares 0 to 1.
+        """Return the share (0 to 1) of each pixel that each of the world's first `objects` objects covers, (height, width, objects).
 
         `name` and `postures` are those of `expose`: the camera, and the positions of all motors (n,) rad at each of the `moments`.
         `objects`: number of objects.

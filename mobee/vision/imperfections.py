@@ -65,9 +65,10 @@ class CameraSettings(Settings):
 
     @property
     def deviations(self) -> Mapping[str, float]:
-        """A dict from the kind of error to its standard deviation along each axis; a calibration uses them as its prior.
+        """The standard deviation of each kind of error, along each axis; a calibration takes them as those of its prior.
 
-        The kinds are "position" and "rotation" of a mount, "encoder", "latency", "tag_position" and "tag_rotation", in m, rad and s.
+        The keys are "position" [m] and "rotation" [rad] of a camera on its link, "encoder" [rad], "latency" [s], "tag_position" [m] and
+        "tag_rotation" [rad].
         """
         ball = 1.0 / np.sqrt(5.0)  # of a coordinate of a point that is uniform in a ball, over the ball's radius
         return {

@@ -55,7 +55,8 @@ def camera_frames(camera: Camera, transforms: Array, mount: Array) -> tuple[Arra
     """Return the optical centre (..., 3) m and rotation (..., 3, 3) of a camera in the root frame.
 
     The columns of the rotation are the directions right, down and ahead. `transforms`: (..., L, 4, 4) of all links, from `link_transforms`.
-    `mount`: (6,), displacement [m] and rotation vector [rad] of the true camera from that of the model, in the camera's axes.
+    `mount`: (6,), displacement [m] and rotation vector [rad] by which the true camera differs from the camera of the model, in the axes of
+    the latter.
     """
     position, rotation = mounted(camera.position, camera.rotation, mount)
     link = transforms[..., camera.link, :3, :]

@@ -11,9 +11,10 @@ Labels = NDArray[np.intp]
 
 
 def label(mask: Mask, diagonal: bool) -> Labels:
-    """Return the number of the connected region of each pixel, (height, width); 0 outside of the mask.
+    """Return for each pixel the label of the connected region to which it belongs, (height, width); 0 outside of the mask.
 
-    Regions are numbered from 1, in the order of their first pixels. `diagonal`: whether pixels that share only a corner are connected too.
+    The labels are 1, 2, ..., in the order of the first pixels of the regions. `diagonal`: whether pixels that share only a corner are
+    connected too.
     """
     height, width = mask.shape
     line = np.zeros((height, width + 1), dtype=np.int8)  # one pixel more, so that no run of pixels continues in the next row
@@ -62,13 +63,17 @@ def boxes(labels: Labels) -> list[tuple[slice, slice]]:
 
 
 def without_holes(mask: Mask) -> Mask:
-    """Return the mask with its holes filled; a hole is outside of the mask and not connected with the picture's border by pixel sides."""
+    """Return the mask with its holes filled.
+
+    A hole is a set of pixels outside of the mask from which no path of pixels outside of the mask leads to the picture's border; two pixels
+    of a path share a side.
+    """
     outside = label(~np.pad(mask, 1), diagonal=False)
     filled: Mask = (outside != 1)[1:-1, 1:-1]
     return filled
 
 
 def border(mask: Mask) -> Mask:
-    """Return a mask of the mask's pixels that share a side with a pixel outside of the mask."""
+    """Return those pixels of a mask that share a side with a pixel outside of it, as a mask."""
     wide = np.pad(mask, 1)
     return mask & ~(wide[:-2, 1:-1] & wide[2:, 1:-1] & wide[1:-1, :-2] & wide[1:-1, 2:])

@@ -22,9 +22,9 @@ AXES = ("x", "y", "z", "turn_x", "turn_y", "turn_z")  # of a mount
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rig:
-    """A robot with cameras, before a calibration; it defines the order of the calibration's parameters.
+    """A robot with cameras, as the kinematic model has them; `names` is the order of the parameters that a calibration estimates.
 
-    `cameras`: by name, at their positions in the model. `lens`: lens of all cameras. `tag`: on the palm, or None.
+    `cameras`: by name, with their poses in the model. `lens`: lens of all cameras. `tag`: on the palm; None: the robot has no tag.
     """
 
     robot: Robot
@@ -56,14 +56,14 @@ class Rig:
         )
 
     def errors(self, x: Array) -> CameraErrors:
-        """Convert parameters x (P,) to CameraErrors."""
+        """Convert the calibration's parameters x (P,), in the order of `names` (m, rad and s), to CameraErrors."""
         encoders = np.zeros(len(self.robot.motors))
         encoders[list(self.head)] = x[self.where("encoder")]
         mounts = {camera: x[self.where(camera)] for camera in self.cameras}
         return CameraErrors(mounts, encoders, float(x[self.where("latency")][0]), x[self.where("tag")])
 
     def parameters(self, errors: CameraErrors) -> Array:
-        """Convert CameraErrors to parameters (P,)."""
+        """Convert CameraErrors to the calibration's parameters (P,), in the order of `names` (m, rad and s)."""
         x = np.zeros(len(self.names))
         for camera in self.cameras:
             x[self.where(camera)] = errors.mounts[camera]
@@ -72,7 +72,10 @@ class Rig:
         return x
 
     def deviations(self, kinds: Mapping[str, float]) -> Array:
-        """Return the standard deviations (P,) of the parameters before the calibration; `kinds`: as `CameraSettings.deviations`."""
+        """Return the standard deviations (P,) of the calibration's parameters in its prior, in the order of `names`.
+
+        `kinds`: the standard deviation of each kind of error, as `CameraSettings.deviations` returns them.
+        """
         mount = [kinds["position"]] * 3 + [kinds["rotation"]] * 3
         tag = [kinds["tag_position"]] * 3 + [kinds["tag_rotation"]] * 3
         return np.array([*mount * len(self.cameras), *[kinds["encoder"]] * len(self.head), kinds["latency"], *tag])
@@ -109,7 +112,7 @@ class Seen:
 def see_points(rig: Rig, camera: str, x: Array, q: Array, dq: Array, points: Array) -> Seen:
     """Predict the pixels of points (K, C, 3) m, root frame, in K pictures of a camera.
 
-    `x`: (P,) the calibration's parameters. `q` (K, n) rad and `dq` (K, n) rad/s: encoders and velocities at the stamps.
+    `x`: (P,) the calibration's parameters. `q` (K, n) rad and `dq` (K, n) rad/s: encoders and velocities at the time stamp of each picture.
     """
     transforms = link_transforms(rig.robot, rig.posture(x, q, dq))
     motion = np.zeros((*points.shape, len(rig.robot.motors)))
@@ -119,7 +122,7 @@ def see_points(rig: Rig, camera: str, x: Array, q: Array, dq: Array, points: Arr
 def see_tag(rig: Rig, camera: str, x: Array, q: Array, dq: Array) -> Seen:
     """Predict the pixels of the four corners of the tag on the hand, in K pictures of a camera.
 
-    `x`: (P,) the calibration's parameters. `q` (K, n) rad and `dq` (K, n) rad/s: encoders and velocities at the stamps.
+    `x`: (P,) the calibration's parameters. `q` (K, n) rad and `dq` (K, n) rad/s: encoders and velocities at the time stamp of each picture.
     """
     assert rig.tag is not None
     transforms = link_transforms(rig.robot, rig.posture(x, q, dq))

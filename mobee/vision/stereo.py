@@ -33,7 +33,7 @@ class Sighted:
 class Place:
     """A located point in the root frame.
 
-    `position`: (3,) m. `covariance`: (3, 3) m^2. `misfit`: sum of the squared residuals of its pixels, in standard deviations.
+    `position`: (3,) m. `covariance`: (3, 3) m^2. `misfit`: squared Mahalanobis length of the residuals of all its pixels, no unit.
     """
 
     position: Array

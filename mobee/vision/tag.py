@@ -41,8 +41,8 @@ SMALLEST = 5.0  # px: the side of a tag below which its corners are not used
 class Tag:
     """A square AprilTag on a palm.
 
-    `marker`: name of the robot's marker whose normal points out of the palm. `size`: side of the tag's black border, m. `above`: distance
-    of the tag from the marker along the normal, m.
+    `marker`: name of the marker at the palm; a marker is a point on a link with a normal, and this normal points out of the palm. `size`:
+    side of the tag's black border, m. `above`: distance of the tag from the marker along the normal, m.
     """
 
     marker: str
@@ -59,10 +59,10 @@ class Tag:
         return 0.5 * self.size * np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
 
     def frame(self, robot: Robot) -> tuple[int, Array, Array]:
-        """Return the number of the tag's link, and the tag's position (3,) m and rotation (3, 3) in the root frame at the zero pose.
+        """Return the index of the tag's link, and the tag's position (3,) m and rotation (3, 3) in the root frame at the zero pose.
 
-        The columns of the rotation are the directions right and down, as seen from outside, and into the palm. Raises UnknownName for a
-        robot without the marker.
+        The columns of the rotation are the tag's axes: x to the right and y down (for a viewer in front of the palm), z into the palm.
+        Raises UnknownName if the robot has no marker of the name `marker`.
         """
         marker = robot.marker(self.marker)
         inwards = -marker.normal
@@ -76,7 +76,8 @@ class Tag:
 def tag_solids(tag: Tag, robot: Robot, mount: Array) -> list[LinkSolid]:
     """Return the tag with a white margin as solids for the renderer.
 
-    `mount`: (6,), displacement [m] and rotation vector [rad] of the true tag from that of the model, in the tag's axes.
+    `mount`: (6,), displacement [m] and rotation vector [rad] by which the true tag differs from the tag of the model, in the axes of the
+    latter.
     """
     link, position, rotation = tag.frame(robot)
     position, rotation = mounted(position, rotation, mount)

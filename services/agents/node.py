@@ -47,8 +47,8 @@ class Work:
     def run(self, resumed: str, enough: Callable[[], bool], step: Callable[[], None]) -> None:
         """Call `step` until `enough()` returns True, and answer calls between the steps.
 
-        If an action is interrupted, this is counted and published as an event, and the next step begins. `resumed`: text of the event by
-        which the user learns that the agent continues from stored transitions; empty if it begins without any.
+        If an action is interrupted, this is counted and published as an event, and the next step begins. `resumed`: text of an event which
+        is published first, and says that the agent continues from stored transitions; empty: the agent starts without any.
         """
         self._service.ready()
         if resumed:

@@ -29,8 +29,8 @@ class ObjectPlant(PerceivingPlant):
     """A live plant that perceives one object, and completes each action by looking at this object.
 
     Pictures that were taken before the end of the motion do not count. If the object is not seen, the part moves to the posture `aside` of
-    the settings, and the action ends there. If the object is not seen in its area from there either, it has fallen or left: the simulator,
-    or a person, puts it back, and the action ends when it is back. So an outcome always contains what was seen after the action.
+    the settings, and the action ends there. If it is still not seen in its area, it has fallen or has left the area. The simulator or a
+    person puts it back, and the action ends when the object is seen again. So an outcome always contains what was seen after the action.
 
     Args:
         service: the service of the agent.
@@ -53,7 +53,9 @@ class ObjectPlant(PerceivingPlant):
         """How often the part moved aside because the object was not seen."""
 
     def measure(self, part: str) -> Array:
-        """Return the part's motor positions (n_part,) rad, after the object was seen; the part may have moved aside so that it is seen.
+        """Wait until the object is seen in its area, then return the part's motor positions (n_part,) rad.
+
+        If the object is not seen within 2 s (LOOK) of the robot's clock, the part first moves to the posture `aside`.
 
         Implements `mobee.plant.Plant.measure`.
         """

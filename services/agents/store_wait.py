@@ -27,7 +27,7 @@ class StoreWait:
         self.waits_for = ""  # why this agent waits; empty: it does not
 
     def status_prefix(self) -> str:
-        """Return the beginning of the agent's line in `mobee status`; empty if the agent does not wait."""
+        """Return the beginning of the agent's line in `mobee status`; empty if the agent does not wait for its store."""
         return f"waits: {self.waits_for}; " if self.waits_for else ""
 
     def until_accepted(self, act: Callable[[], _T]) -> _T:
@@ -53,7 +53,10 @@ class StoreWait:
         return result
 
     def let_append_wait(self, store: Any) -> None:
-        """Replace the method `append` of a store by one that is repeated until the store accepts the data, as by `until_accepted`."""
+        """Replace the method `append` of a store by one that repeats the call until the store accepts the data.
+
+        It waits and raises errors like `until_accepted`.
+        """
         append = store.append
         store.append = lambda *data: self.until_accepted(lambda: append(*data))
 

@@ -129,8 +129,8 @@ class LearnedStream:
 def surprises(model: TransitionModel) -> list[Surprise]:
     """Return the observed next states that differ from the goals of their actions, each with its share of the action's observations.
 
-    Imagined outcomes, which are pseudo-counts from before the first try, do not count. At most MAX_SURPRISES (2000) outcomes are returned,
-    those with the largest shares.
+    Only real observations are used, without the pseudo-counts that each action has before its first try. At most MAX_SURPRISES (2000)
+    outcomes are returned, those with the largest shares.
     """
     real = np.where(model.counts > 0.0, model.counts - model.imagined, 0.0)
     unexpected = (real > 0.0) & (model.outcomes != model.space.goals[:, :, None])
@@ -155,7 +155,7 @@ class ReachStream:
         self._learned = LearnedStream(bus, self._seen)
 
     def put(self, step: Step, target: ReachTarget, plan: tuple[Array, Array]) -> None:
-        """Publish a step of the agent towards the target `target`, and count it.
+        """Publish a step of the agent towards the target `target`, and add its transition to the counts.
 
         `plan`: values V (S,) and Q (S, A + 1) of the plan that chose the step; the last column of Q is the action of reaching. A step that
         is a reach is not a transition, and is not published as one.

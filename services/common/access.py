@@ -25,7 +25,7 @@ def access_list(identities: Mapping[str, Party], namespace: str, clients: str = 
     Everything that the setting does not allow is denied. An identity that is not listed may do nothing.
 
     Args:
-        identities: the party (role on the bus) of each identity, by the name of the identity in its certificate.
+        identities: a dict from the name of an identity, as in its certificate, to its party (role on the bus).
         namespace: prefix of all keys of the robot.
         clients: prefix of the keys under which the port filter's clients find the robot; empty if there is no port filter.
     """

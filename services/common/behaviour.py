@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A behaviour as a process: moves a part by the position of a target, pauses while it cannot, and reports why (docs/behaviours.md)."""
+"""A behaviour as a process: moves a part depending on a target's position, pauses while it cannot, and reports why (docs/behaviours.md)."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ LONGEST_STEP = 0.1  # s: after a longer gap between two ticks the motion continu
 
 
 class BehaviourConfig(ServiceConfig, frozen=True, kw_only=True):
-    """Settings that every behaviour has; a behaviour is a service that moves one part by the position of a target."""
+    """Settings that every behaviour has; a behaviour is a service that moves one part depending on a target's position."""
 
     part: str = ""
     """Part that the behaviour moves."""

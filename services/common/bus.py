@@ -104,20 +104,23 @@ class Publisher(Generic[_M]):
 
 
 class Latest(Generic[_M]):
-    """Stores the newest message of a stream until it is read; older ones are overwritten, never queued."""
+    """Stores the newest message of a stream until it is read; older ones are overwritten, never queued.
+
+    `part`: the part whose number of motors the vectors in the messages must have; None: the lengths are not checked.
+    """
 
     def __init__(self, bus: Bus, key: str, cls: type[_M], part: str | None) -> None:
         self._bus, self._cls, self._part = bus, cls, part
         self._subscriber = bus.session.declare_subscriber(key, RingChannel(1))
 
     def take(self) -> _M | None:
-        """Return the newest valid message since the last call; None if there is none."""
+        """Return the newest message since the last call; None if no message has arrived, or if the newest one is refused."""
         sample = self._subscriber.try_recv()
         return None if sample is None else self._bus.receive(self._cls, sample, self._part)
 
 
 def part_of(cls: type[Message], name: str) -> str | None:
-    """Return the part by whose number of motors the lengths of vectors in messages of the type `cls` are checked; None: not checked.
+    """Return the part whose number of motors the vectors in messages of the type `cls` must have; None: the lengths are not checked.
 
     `name`: value of the variable in the messages' key. If the variable is the part, the result is `name`, except for * (any part). In all
     other cases the result is None.
@@ -126,11 +129,11 @@ def part_of(cls: type[Message], name: str) -> str | None:
 
 
 def other_key(received: zenoh.Sample | zenoh.Query) -> str:
-    """Return the key under which a message or call was sent, if it has arrived under another key; otherwise an empty text.
+    """Return the key under which a message or call was sent, if it differs from the key under which it arrived; otherwise an empty text.
 
-    `received`: the message or call, as Zenoh has delivered it. Zenoh transmits numbers in place of keys, and just after a connection was
-    replaced by a new one, a number can stand for another key. Each sender therefore attaches the key to the message. If no key is attached,
-    the result is an empty text; if the attached key is empty, the result is "nothing".
+    `received`: the message or call, as Zenoh has delivered it. Zenoh transmits numbers that stand for keys. Just after a connection was
+    replaced by a new one, such a number can stand for a wrong key. Each sender therefore attaches the true key to the message. If no key is
+    attached, the result is an empty text; if the attached key is empty, the result is "nothing".
     """
     attached = received.attachment
     if attached is None or (sent := attached.to_bytes()) == str(received.key_expr).encode():
@@ -148,7 +151,10 @@ def require_key(received: zenoh.Sample | zenoh.Query) -> None:
 
 
 class Bus:
-    """The connection of a process with the bus: its session, the newest tick and time, and the counts of refused messages."""
+    """The connection of a process with the bus: its session, the newest tick and time, and the counts of refused messages.
+
+    `who`: name of the service, which its messages contain as `src`.
+    """
 
     def __init__(self, session: zenoh.Session, who: str, log: logging.Logger) -> None:
         self.session, self.who, self.log = session, who, log
@@ -181,7 +187,7 @@ class Bus:
 
         Args:
             cls: type of the messages; its `stream` contains key and delivery class.
-            name: the variable in its key, such as the part.
+            name: value of the variable in the stream's key, such as the name of the part; empty: the key has no variable.
             delivery: delivery class of the stream; None: that of the type `cls`.
         """
         return Publisher(self, cls.stream.key(name), cls, delivery or cls.stream.delivery)
@@ -189,7 +195,8 @@ class Bus:
     def latest(self, cls: type[_M], name: str = "*") -> Latest[_M]:
         """Return an object that stores the newest message of a stream.
 
-        `name`: the variable in the key of the stream, such as the part; by default any.
+        `name`: value of the variable in the stream's key, such as the name of the part. By default the object accepts messages with any
+        value.
         """
         return Latest(self, cls.stream.keys(name), cls, part_of(cls, name))
 
@@ -237,9 +244,9 @@ class Bus:
             self.report_defect(what, error)
 
     def report_defect(self, what: str, error: Exception) -> str:
-        """Record that the handler of a stream or call has failed with `error`: count and log it, publish a warning; return its text.
+        """Count and log a failed handler of a stream or call, and publish a warning; return the text of the report.
 
-        `what`: name of the stream or call.
+        `what`: name of the stream or call. `error`: the exception that the handler has raised.
         """
         text = f"the handler of {what} failed: {type(error).__name__}: {error}"
         self.log.error("%s", text, exc_info=error)

@@ -49,12 +49,12 @@ class Sent:
 class BusPlant:
     """The live robot as a plant (`mobee.reach.ReachPlant`): acts and reaches with some parts through controller and model on the bus.
 
-    To move a part, it takes the part's goal, which is the right to set the part's attractor, the posture to which the controller moves the
-    part. While it waits, the service answers calls.
+    To move a part, the plant takes the part's goal. The goal is the right to set the attractor, which is the posture to which the
+    controller moves the part. While the plant waits, the service answers calls.
 
     In lockstep (every tick waits for all participants) the plant also answers the ticks for its service. It answers a tick only when the
-    service waits again, that is, after the service has decided on its next action. So simulated time stands still during a decision, unless
-    it takes longer than the patience of robot_sim.
+    service waits again, that is, after the service has decided on its next action. So simulated time stands still during a decision. If the
+    decision takes longer than the setting `patience` of robot_sim (s of real time), robot_sim no longer waits for the service.
     """
 
     def __init__(self, service: Service, robot: Robot, parts: tuple[str, ...]) -> None:
@@ -113,9 +113,9 @@ class BusPlant:
         """Set the part's attractor to `target` (n_part,) rad, and wait until the part has settled or timed out; return the outcome.
 
         Implements `mobee.plant.Plant.act`. If the controller ends, the action continues as soon as another controller has the part under
-        control. Raises InvalidValue for a target beyond the limits; ActionInterrupted if the part is in hold (it stands still and follows
-        no commands), on a fault or a new run, if no controller can continue within 10 s, and if the controller gives the goal to another
-        service.
+        control. Raises InvalidValue for a target beyond the limits. Raises ActionInterrupted if the part is in hold (it stands still and
+        follows no commands) or has a fault; if robot_sim starts a new run; if no controller can continue the action within 10 s; or if the
+        controller gives the part's goal to another service.
         """
         sent = self._perform(part, "goal", Goal, q=[float(x) for x in target])
         return self._outcome(part, sent)
@@ -160,8 +160,8 @@ class BusPlant:
 
         Then the attractor pulls the part back, or, with `stay`, the part stays where the force ended. Implements
         `mobee.reach.ReachPlant.reach`. Raises InvalidValue if no target is presented or the part does not move the marker;
-        ActionInterrupted if the part is in hold (it stands still and follows no commands), on a fault or a new run, if the controller ends,
-        and if it gives the goal to another service.
+        ActionInterrupted if the part is in hold (it stands still and follows no commands) or has a fault; if robot_sim starts a new run; if
+        the controller ends; or if the controller gives the part's goal to another service.
         """
         self.robot.marker(marker)
         sent = self._perform(part, "reach", ReachFor, marker=marker, stay=stay, **self._reaches.asked())
@@ -258,7 +258,7 @@ class BusPlant:
         return self._is_resting
 
     def pause(self, seconds: float) -> None:
-        """Run handlers for `seconds` of real time; raises ActionInterrupted at a request to rest, and at a new run of robot_sim."""
+        """Run handlers for `seconds` of real time; raises ActionInterrupted if `rest` was called, or at a new run of robot_sim."""
         run = self._runs
         self._service.check_router()
         self._wait(lambda: self._is_resting, seconds)

@@ -30,7 +30,10 @@ class CameraConfig(ServiceConfig, frozen=True, kw_only=True):
         self.cameras_on(robot)
 
     def cameras_on(self, robot: Robot) -> dict[str, Camera]:
-        """Return the cameras of the robot by name, with those in the settings; raises MobeeError for a camera that cannot be made."""
+        """Return the first two cameras of the robot and those that the settings add, by name.
+
+        Raises MobeeError for a camera that cannot be made.
+        """
         return cameras_of(robot, self.cameras)
 
 

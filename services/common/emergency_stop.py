@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The emergency stop beyond one process: its record on disk, and the session on which robot_sim receives it.
+"""The emergency stop outside of robot_sim: its record on disk (`StopRecord`), and its reception from the bus (`StopLine`).
 
-A client on robot_sim's machine writes the record itself (`StopRecord.stop`), and robot_sim watches it: that stop needs no router.
+A client on robot_sim's machine can write the record itself (`StopRecord.stop`). robot_sim watches the record, so that such a stop needs no
+router.
 """
 
 from __future__ import annotations
@@ -39,11 +40,10 @@ class Stop(Struct, frozen=True):
 
 
 def replaces(new: Stop, old: Stop | None) -> bool:
-    """Return whether the stop `new` replaces the stop `old` in the record.
+    """Return whether the stop `new` replaces the stop `old` in the record; `old` is None if the robot is not stopped.
 
-    This is so if `old` is None, or if the launcher has set `old` and another process sets `new`.
-
-    A stop by the launcher ends with the run of the system that it has launched; a stop by another process stays.
+    It replaces None. It also replaces a stop that the launcher has set, if another process sets `new`. The reason: the next run of the
+    launcher releases a stop that a launcher has set, but a stop by another process must remain.
     """
     return old is None or (old.source == BY_LAUNCHER and new.source != BY_LAUNCHER)
 
@@ -62,8 +62,8 @@ class StopRecord:
     def of_endpoint(cls, endpoint: str, states: Path | None = None) -> StopRecord:
         """Return the record of the robot that is reached at an endpoint of this machine; all runs of the robot share it.
 
-        `states`: folder in which programs keep the state files of the user who has launched the robot, such as ~/.local/state; None: that
-        of the user of this process.
+        `states`: folder of a user in which programs keep their state files, such as ~/.local/state. It must be the folder of the user who
+        has launched the robot. None: the folder of the user of this process.
         """
         endpoint = re.sub("^(tls|quic)/", "tcp/", endpoint)  # a stop stays in force with or without security
         states = states or Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local/state")
@@ -81,12 +81,18 @@ class StopRecord:
             self.release()
 
     def remove(self) -> None:
-        """Remove the record at the end of a run of the launcher, unless a stop is in force; raises OSError if that is impossible."""
+        """Remove the file if it records that the robot is released; the launcher calls this when its run ends.
+
+        A file that records a stop or cannot be read stays. Raises OSError if the file cannot be removed.
+        """
         if self.read() is None:
             self._path.unlink(missing_ok=True)
 
     def read(self) -> Stop | None:
-        """Return the stop in force; None if the robot is released. If the file cannot be read, return a stop with this reason."""
+        """Return the recorded stop; None if the file records that the robot is released.
+
+        If the file does not exist or cannot be read, return a stop whose reason says that the record cannot be read.
+        """
         try:
             found = json.loads(self._path.read_bytes())
             if found["stopped"] is False:
@@ -96,9 +102,9 @@ class StopRecord:
             return Stop("robot_sim", f"the record of emergency stops {self._path} cannot be read ({type(error).__name__})")
 
     def new_stop(self) -> Stop | None:
-        """Return the stop in force if the file has changed since the last call; otherwise None.
+        """Return what `read` returns if the file has changed since the last call, or at the first call; otherwise None.
 
-        A file that does not exist is no stop here, because the launcher removes the file when its run ends.
+        If the file does not exist, the result is None too: the launcher removes the file when its run ends.
         """
         try:
             found = self._path.stat()
@@ -110,11 +116,11 @@ class StopRecord:
         return self.read() if self._path.exists() else None
 
     def stop(self, source: str, reason: str) -> bool:
-        """Record a new stop, and return whether there is a file.
+        """Record a new stop; return False if the file does not exist, because then no robot_sim watches it.
 
-        `source`: name of the process that stops the robot. `reason`: text for the user. If a stop is in force already, it is replaced only
-        if the launcher has set it and `source` is another process; else it stays. True is returned in all these cases. False: there is no
-        file; then no robot watches the record. Raises OSError if the file cannot be written.
+        `source`: name of the process that stops the robot. `reason`: text for the user. If the file records a stop already, this stop is
+        replaced only if the launcher has set it and `source` is another process. True: the file exists, and records the new stop or the
+        earlier one. Raises OSError if the file cannot be written.
         """
         if not self._path.exists():
             return False
@@ -132,7 +138,7 @@ class StopRecord:
         self._write({"stopped": False, "time": time.time(), "monotonic_ns": time.monotonic_ns()})
 
     def released_at(self) -> int:
-        """Return the time of the last release, ns of the monotonic clock; 0 if it is not known."""
+        """Return the time of the last release, ns of the monotonic clock; 0 if the file records a stop or cannot be read."""
         try:
             return int(json.loads(self._path.read_bytes()).get("monotonic_ns", 0))
         except (OSError, ValueError, AttributeError, TypeError, RecursionError):

@@ -27,8 +27,9 @@ it may join."""
 def wait_until_released() -> tuple[str, ...]:
     """If a launcher has started this service, wait until the services on which it depends are ready.
 
-    Returns the words of the environment variable MOBEE_HELD: the id of the router's process on the bus and, if the launcher has joined from
-    another host, the launcher's process id; () without a launcher. Raises SystemExit if the launcher ends during the wait.
+    Returns the words of the environment variable MOBEE_HELD, which the launcher sets. The first word is the id of the router's process on
+    the bus. If the launcher runs on another host than the router, the second word is the launcher's process id. Without a launcher the
+    result is (). Raises SystemExit if the launcher ends during the wait.
     """
     held = os.environ.pop(HELD, "").split()
     if held and not os.read(sys.stdin.fileno(), 1):

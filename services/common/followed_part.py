@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The part that a behaviour moves: takes the part's goal when it may, and moves the part's attractor; never waits for an answer."""
+"""The part that a behaviour moves: requests the part's goal from the controller, and moves the part's attractor.
+
+The goal of a part is the right to set its attractor, the posture to which the controller moves the part. No method waits for an answer.
+"""
 
 from __future__ import annotations
 
@@ -21,9 +24,10 @@ RETRY_PERIOD = 0.5  # s of real time between two attempts to take the part
 
 
 class FollowedPart:
-    """Takes, moves and releases the goal of one part for a behaviour, and keeps the newest `Motion` message of every part.
+    """Requests and releases the goal of one part for a behaviour, moves the part, and keeps the newest `Motion` message of every part.
 
-    The goal of a part is the right to set its attractor, the posture to which the controller moves the part. No method waits for an answer.
+    The goal of a part is the right to set its attractor (the posture to which the controller moves the part). The controller gives this
+    right to one service at a time. No method waits for an answer.
     """
 
     def __init__(self, service: Service, robot: Robot, part: str) -> None:

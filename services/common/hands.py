@@ -26,10 +26,11 @@ def moved_markers(robot: Robot, part: str) -> tuple[str, ...]:
 
 
 def hand_of(robot: Robot, part: str) -> str:
-    """Return the name of the marker with which a part reaches: the palm on its side (the right one for a torso), if it moves that palm.
+    """Return the name of the marker with which a part reaches: a palm, if the part moves it.
 
-    Otherwise it is the part's first marker at the end of the robot's tree of links (`end_markers`), or else the first marker that it moves.
-    Raises UnknownName for a part that the robot does not have, InvalidValue for one that moves no marker.
+    The palm is `left_palm` for a part whose name begins with "left", and `right_palm` for every other part, such as a torso. If the part
+    does not move this palm, return the first of the `end_markers` that the part moves, or else the first marker that it moves. Raises
+    UnknownName for a part that the robot does not have, InvalidValue for one that moves no marker.
     """
     found = moved_markers(robot, part)
     palm = PALMS[0] if part.startswith("left") else PALMS[1]
@@ -41,10 +42,10 @@ def hand_of(robot: Robot, part: str) -> str:
 
 
 def end_markers(robot: Robot) -> tuple[str, ...]:
-    """Return the names of the markers on links without child links, or of all markers that motors move if no such link has a marker.
+    """Return the names of the markers on links without child links, without the markers that no motor moves.
 
-    Only markers that a motor moves count. They are sorted by the number of motors that move them, the largest number first: a hand comes
-    before a wheel.
+    If none is left, return all markers that a motor moves. The names are sorted by the number of motors that move the marker, the largest
+    number first: a hand comes before a wheel.
     """
     inner = {joint.parent for joint in robot.joints}
     links = frozenset[int]().union(*links_moved(robot).values())
@@ -66,11 +67,11 @@ def part_of(robot: Robot, marker: str) -> str:
 
 
 def hand_for(robot: Robot, place: Array | None) -> str:
-    """Return the name of the marker with which to reach for a place: the candidate that is nearest to the place when the robot is at home.
+    """Return the name of the marker with which to reach for a place: the candidate that is nearest to it in the robot's home posture.
 
-    The candidates are the two palms, or, without palms, the markers at the ends of the robot's tree that the most motors move
-    (`end_markers`). `place`: (3,) m, root frame; None: not known. If several are equally near, or the place is not known, the right palm or
-    the first candidate is returned. Raises InvalidValue if no motor of the robot moves a marker.
+    The candidates are the two palms, the right one first. For a robot without both palms, they are the first of its `end_markers` and those
+    that equally many motors move. `place`: (3,) m, root frame; None: not known. If several are equally near, or the place is not known, the
+    first of these candidates is returned. Raises InvalidValue if no motor of the robot moves a marker.
     """
     ends = end_markers(robot)
     if not ends:

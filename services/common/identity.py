@@ -59,10 +59,11 @@ class Identity:
         return self.folder / f"{AUTHORITY}.crt"
 
     def socket(self, endpoint: str) -> str:
-        """Return the second address of the secured router at `endpoint`: a Unix socket in the folder of keys. Empty if it has none.
+        """Return the second address at which the secured router of `endpoint` listens: a Unix socket in the folder of keys.
 
-        The router listens there for the commands of its user. Only users who may read the keys can connect, and their connections are
-        handled before those of others.
+        The commands that a user starts on the router's host (identity `operator`) connect there. Only users who may read the keys can
+        connect, and their connections are handled before those of others. The result is empty if the system has no Unix sockets, or if the
+        path of the socket is too long.
         """
         path = self.folder / f"{endpoint.rpartition(':')[2]}.sock"
         return f"unixsock-stream/{path}" if os.name == "posix" and len(os.fsencode(path)) <= LONGEST_SOCKET else ""
@@ -87,7 +88,8 @@ class Identity:
     def settings(self) -> dict[str, object]:
         """Return the settings of Zenoh with which this process shows its certificate, and accepts only certificates of the same authority.
 
-        The name of the host is not compared, because only one certificate of the authority may listen: that of the router.
+        A client does not compare the name in the router's certificate with the name of the host. It need not, because of all certificates
+        of the authority only the router's is valid for a server.
         """
         listens = self.name == ROUTER
         own = {"listen_certificate": str(self.certificate), "listen_private_key": str(self.key)}
@@ -100,7 +102,7 @@ class Identity:
 def assume(identity: Identity | None) -> None:
     """Give this process the identity `identity`, by its environment variables; None: no identity.
 
-    A launcher inherits the identity of its user, which its services must not have.
+    A launcher calls this, because it has inherited the identity of its user in these variables, and its services must not inherit it.
     """
     for name in (KEYS, IDENTITY):
         os.environ.pop(name, None)

@@ -56,7 +56,8 @@ class Timer:
 class Inbox:
     """A queue of handlers, in the order of arrival, and timers; the main thread runs both.
 
-    A `queue.SimpleQueue` is not used, because its `get` can wait without limit if its time ends while it begins to wait (CPython 3.11).
+    A `queue.SimpleQueue` is not used: in CPython 3.11, its `get(timeout)` can block without limit if the timeout is over just when it
+    begins to wait.
     """
 
     def __init__(self) -> None:
@@ -141,9 +142,9 @@ class Inbox:
         self._spin(until, enough, self._take_waiting)
 
     def serve(self, until: float) -> None:
-        """Run handlers until the time `until` [s] of the monotonic clock; meanwhile other threads may run handlers too (`handle`).
+        """Run handlers until the time `until` [s] of the monotonic clock; while no handler is queued, other threads may run handlers.
 
-        The thread that has received a message then also handles it, which saves two thread switches.
+        They do so by the method `handle`. The thread that has received a message can thus handle it too, which saves two thread switches.
         """
         self._serves = True
         try:

@@ -46,8 +46,8 @@ class Listener:
     def on_newest(self, cls: type[_M], handler: Callable[[_M], None], name: str = "*", *, any_run: bool = False) -> None:
         """Call `handler` with the newest message of a stream; a message that still waits is replaced by a newer one.
 
-        A participant in lockstep handles every message instead. `name`: the variable in the message's key, such as the part; by default
-        any. `any_run`: also a message of another run of robot_sim.
+        A participant in lockstep handles every message instead. `name`: value of the variable in the stream's key, such as the name of a
+        part; "*": all values. `any_run`: True: accept also messages of other runs of robot_sim; False: refuse them.
         """
         part = part_of(cls, name)
         self._subscribe(cls.stream.keys(name), self._newest(lambda sample: self._deliver(cls, sample, handler, part, any_run)))
@@ -68,12 +68,14 @@ class Listener:
         Args:
             cls: type of the messages.
             handler: called in the main thread.
-            name: the variable in the message's key, such as the part; by default any.
+            name: value of the variable in the stream's key, such as the name of a part; "*": all values.
             history: also handle messages that were published before this service subscribed, as soon as it knows the present run of
                 robot_sim.
-            any_run: also handle messages of another run of robot_sim.
-            crowd: number of waiting handlers at which further messages of this stream are dropped.
-            later: do not wake the main thread; the messages are handled just before the next message of another stream.
+            any_run: True: accept also messages of other runs of robot_sim; False: refuse them.
+            crowd: if so many handlers wait in the inbox, new messages of this stream are dropped. With `later`, only messages that were
+                queued with `later` are included in this number.
+            later: True: messages of this stream do not wake the main thread. They wait, and are handled just before the next message of
+                another stream.
         """
         key, part = cls.stream.keys(name), part_of(cls, name)
 

@@ -34,9 +34,9 @@ class Participant:
         """Publish that this service has sent all its messages for tick k (`StepDone`). In free mode this does nothing.
 
         `ok`: False if an input was missing, so that the run is not repeatable. `busy`: names of services that have nothing to decide in
-        this tick; only the controller sets it. `last`: True if the service leaves lockstep. `including`: names of participants that need
-        not answer this tick, because this service has used their messages for it. `implied`: True: publish nothing, because the answer of
-        another service will include this one.
+        this tick; only the controller sets it. `last`: True if the service leaves lockstep. `including`: names of participants whose
+        messages for this tick this service has used; these need not answer the tick themselves. `implied`: True: publish nothing, because
+        another service will name this service in its `including`.
         """
         if not self._locked:
             return
@@ -54,9 +54,10 @@ class Barrier:
     """The participants that must answer a tick in lockstep, and their answers.
 
     A tick waits only for participants that are present. A participant is present from its first answer on. It is absent when its liveliness
-    token has disappeared, when it was dropped because it was late, or when it has left lockstep; if it answers again, it is present again.
-    The controller's answer to a tick lists participants that are busy with an action: these need not answer this tick. All others get a
-    `Turn` message after the controller's answer, so that an agent need not read every tick.
+    token has disappeared, when it has not answered within `patience` [s] of real time, or when it has left lockstep. If it answers again,
+    it is present again. The answer of the controller (`referee`) to a tick lists participants that are busy with an action: these need not
+    answer this tick. All others get a `Turn` message after the controller's answer. An agent can therefore wait for `Turn` messages, and
+    need not read every tick. `report(participant, reason)` is called when the run is no longer repeatable.
     """
 
     def __init__(
@@ -92,7 +93,10 @@ class Barrier:
         return sorted(self._expected - self._present)
 
     def missing(self, k: int) -> list[str]:
-        """Return the names of the present participants that have not answered tick k yet, and must do so."""
+        """Return the names of the present participants that must still answer tick k.
+
+        When the controller (`referee`) has answered this tick, the participants that it lists as busy need not answer.
+        """
         waiting = {who for who in self._present if self._answered.get(who, -1) < k}
         if waiting and self._referee not in waiting and self._answered.get(self._referee) == k:
             waiting.difference_update(self._busy)
@@ -125,7 +129,10 @@ class Barrier:
                 turn.put(dt=self._service.bus.dt)
 
     def note(self, who: str, re_k: int, answer: Answer) -> None:
-        """Record that the participant `who`, and the participants in `answer.including`, have answered tick `re_k`."""
+        """Record the answer of the participant `who` to tick `re_k`.
+
+        `answer.including`: names of participants whose messages for this tick `who` has used; the tick counts as answered by these too.
+        """
         for one in (who, *answer.including):
             self._answered[one] = re_k
             self._present.add(one)

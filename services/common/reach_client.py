@@ -55,7 +55,7 @@ class ReachClient:
         If the object moves, reaches follow it. `aim`: the marker has to reach the "centre" or the "surface" of the target. `normal`:
         desired direction (3,) of the marker's normal, root frame; None: any. `faces`: True: the normal has to point at the target. Raises
         UnknownName if there is no such object; InvalidValue if the object is stale, that is, not seen any more, or if its role is not
-        target, because it then repels hands; ActionInterrupted if the model does not answer.
+        "target" (an object with the role "obstacle" repels the hand); ActionInterrupted if the model does not answer.
         """
         found = self._known(name)
         if found.role != "target":
@@ -69,9 +69,10 @@ class ReachClient:
         return self._target
 
     def asked(self) -> dict[str, object]:
-        """Return the fields of a `ReachFor` request that describe the presented target; raises InvalidValue if none is presented.
+        """Return the fields of a `ReachFor` request (a call that starts a reach) that describe the presented target.
 
-        If the model was started again, the target is put into its world again.
+        They are "object", "position", "radius", "aim", "normal" and "faces". If the model has been restarted since `present`, the target is
+        first put into its world again. Raises InvalidValue if no target is presented.
         """
         target = self._target
         if target is None:
@@ -89,15 +90,15 @@ class ReachClient:
         }
 
     def has_ended(self, part: str, action_id: str) -> bool:
-        """Return whether the controller has reported that the force of the reach `action_id` of a part has ended."""
+        """Return whether the controller has reported that the force of a part's reach has ended. `action_id`: id of this reach."""
         reach = self._reaches.get(part)
         return reach is not None and reach.action_id == action_id and reach.phase != "reaching"
 
     def outcome(self, part: str, motion: Motion, after: Outcome, tick: float) -> ReachOutcome:
         """Return the outcome of a part's reach that has ended; raises ActionInterrupted if the reach was interrupted.
 
-        `motion`: the last `Motion` message of the part. `after`: outcome of the second phase, in which the attractor pulls the part back,
-        with the duration of both phases. `tick`: length of a tick, s.
+        A reach has two phases: a force pulls the marker, then the attractor pulls the part back. `motion`: the last `Motion` message of the
+        part. `after`: outcome at the end of the second phase; its `duration` must be that of both phases. `tick`: length of a tick, s.
         """
         reach = self._reaches[part]
         if reach.phase == "interrupted":

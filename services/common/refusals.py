@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a secured router refuses: connections without a valid certificate, and messages that the access list does not allow.
 
-Zenoh reports these in its log alone, on the standard output of the process.  There the log goes to a pipe, which a thread reads several
-times a second; what the program itself prints still goes to the standard output.
+Zenoh reports these refusals only in its log, which it prints on the standard output of the process.  `RefusalLog.open` redirects this log
+to a pipe, which a thread reads several times a second.  What the program itself prints still goes to the original standard output.
 """
 
 from __future__ import annotations

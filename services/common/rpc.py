@@ -76,9 +76,9 @@ def flush(session: zenoh.Session, who: str) -> None:
     """Wait until the router has received every message sent so far, for at most 0.5 s (FLUSH_TIMEOUT).
 
     Call this before you close a session; otherwise messages can be lost. When a session is closed, Zenoh drops the messages that it is
-    still sending, and a router that cannot write to the closed connection drops the messages that it has not read. This function sends the
-    router a call with the lowest priority, which the router answers after all other messages, even if no service answers this key. `who`:
-    name of the calling process.
+    still sending. If the router then cannot write to the closed connection, it also drops the messages that it has not read from there.
+    This function sends the router a call with the lowest priority. The router answers it after all earlier messages, even if no process
+    serves this call. `who`: name of the calling process.
     """
     key, lowest = keys.service_rpc("router", "stat"), zenoh.Priority.BACKGROUND
     payload = encode(Empty(v=VERSION, id=uuid.uuid4().hex, who=who))
@@ -180,8 +180,9 @@ class Answering:
     def answer(self, query: zenoh.Query, declared: str, cls: type[_Q], handler: Callable[[_Q, str], Reply], part_of_key: bool) -> None:
         """Reply to a query with the result of handler(request, key), or with the refusal that the handler raises (CallRefused).
 
-        `declared`: the key, or key expression, under which the service answers. `cls`: type of the request. `part_of_key`: True: the key
-        begins with the name of a part, and vectors over the motors of a part in the request must have the length of that part.
+        `declared`: key or key expression that the service has declared for these queries. `cls`: type of the request. `part_of_key`: True:
+        the key begins with the name of a part; a vector of the request with one entry per motor of a part must then have as many entries
+        as this part has motors.
         """
         key = str(query.key_expr) if "*" in declared else declared  # answers to one call with a wildcard must differ by key
         with query:

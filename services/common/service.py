@@ -161,8 +161,8 @@ class Service(Listener):
     def on_request(self, key: str, cls: type[_Q], handler: Callable[[_Q, str], Reply], part_of_key: bool = False) -> None:
         """Answer calls of `key` with the reply that handler(request, key) returns.
 
-        `cls`: type of the requests. The handler may raise CallRefused. `part_of_key`: True: the key begins with the name of a part, and
-        vectors over the motors of a part in the request must have the length of that part.
+        `cls`: type of the requests. The handler may raise CallRefused. `part_of_key`: True: the key begins with the name of a part; a
+        vector of the request with one entry per motor of a part must then have as many entries as this part has motors.
         """
 
         def enqueue(query: zenoh.Query) -> None:
@@ -207,8 +207,9 @@ class Service(Listener):
     def ready(self) -> None:
         """Declare the liveliness token of this service; call this after all subscriptions and calls are declared.
 
-        If this is a robot_sim, model, controller or port_filter and no launcher has started it, the method first asks whether another
-        process of the same name is ready. If one answers that it is, the method raises SystemExit, because both would be obeyed.
+        There must be only one robot_sim, model, controller and port_filter, because other processes would obey each of two. If this is one
+        of these services and no launcher has started it, the method first asks whether another process of the same name is ready. If so,
+        it raises SystemExit.
         """
         if self.who in ONLY_ONE and not self._launcher:
             self._require_no_other()
@@ -236,7 +237,10 @@ class Service(Listener):
         self.inbox.spin(until, enough)
 
     def run(self) -> None:
-        """Run handlers until SIGTERM, a shutdown call, or ten seconds without a router or its own launcher."""
+        """Run handlers until SystemExit is raised: by a signal, a shutdown call, or `check_router`.
+
+        The last happens when the router, or the launcher that has started this service, has been missing for 10 s.
+        """
         spin = self.inbox.serve if self._serves else self.inbox.spin
         while True:
             spin(time.monotonic() + 1.0)
@@ -388,7 +392,7 @@ def _measured(value: float) -> int | float | None:
 def return_free_memory() -> None:
     """Return unused memory of this process to the system, if the C library can do so.
 
-    When a service has started, this is about 23 MB if it has read meshes.
+    After the start of a service that has read meshes, about 23 MB are returned.
     """
     trim = _malloc_trim()
     if trim is not None:
@@ -421,15 +425,15 @@ def run_node(
     argv: Sequence[str] | None = None,
     prompt: bool = False,
 ) -> None:
-    """Read the settings, load the robot, create a node on a new service, and serve until a signal or a shutdown call.
+    """Read the settings, load the robot, create a service and its node, and run the service until a signal or a shutdown call.
 
     Args:
         module: dotted name of the program, such as "services.model"; its last word is the name of the service.
         config_class: type of the settings.
-        node: creates the object whose handlers the service runs.
+        node: called as node(service, config, robot); creates the node, that is, the object whose handlers the service runs.
         argv: command line without the program's name; None: that of this process.
-        prompt: True for a service for which every tick waits, and whose handlers never compute for long; in lockstep these then run in the
-            thread that receives the messages, which saves time.
+        prompt: True for a service for which every tick waits, and whose handlers never compute for long. In lockstep its handlers then run
+            in the thread that receives the messages, which saves time.
     """
     config = load_config(config_class, argv, module)
     with explained(module):

@@ -67,23 +67,24 @@ def _config(namespace: str, lease: float, settings: dict[str, object]) -> zenoh.
 
 
 def end_unreceived(endpoint: str, lease: float) -> None:
-    """Let the system end connections of this process at `endpoint` if the other side receives no data for `lease` [s].
+    """Let Linux end a connection of this process at `endpoint` if sent data does not arrive at the other side for `lease` [s].
 
-    Only Linux can do so. For an endpoint of this host nothing is changed, because the network cannot interrupt such a connection, and a
-    process may get no processor for longer than the lease. Zenoh itself ends a silent connection after the lease; with TLS, however, it
-    first waits until the data in the socket is sent, which may be long after an interrupted network works again. Connections that a
-    listener accepts get the limit of the listener. A client must set the limit again for each new connection.
+    This sets the socket option TCP_USER_TIMEOUT; on other systems nothing is changed. Zenoh itself ends a silent connection after the
+    lease, but with TLS it first waits until the data in the socket is sent. If the network was interrupted, this can take until long after
+    it works again. For an endpoint of this host nothing is changed: the network cannot interrupt such a connection, and the other process
+    may be paused on a busy machine for longer than the lease. A connection that a listener accepts gets the option of the listener. A
+    client must call this again for each new connection.
     """
     if not is_local(endpoint) and hasattr(socket, "TCP_USER_TIMEOUT"):
         _set_option(sockets_at(endpoint), socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, round(1e3 * lease))
 
 
 def receive_together(sockets: Iterable[int], count: int) -> None:
-    """Let the system wake this process for data of the connections `sockets` only when `count` bytes wait; only Linux can do so.
+    """Let Linux wake this process for data of a connection only when `count` bytes wait there; other systems change nothing.
 
-    `sockets`: their file descriptors, as `sockets_at` returns them. With `count` = 1 the process is woken for any data, and now for the
-    data that already waits. The caller must set 1 several times per lease, because a connection from which nothing is received for a whole
-    lease counts as dead.
+    `sockets`: file descriptors of the connections, as `sockets_at` returns them. `count` = 1: the process is woken for any data, and at
+    once if data already waits. A caller that has set a larger `count` must set 1 several times per lease, because a connection from which
+    nothing is received for a whole lease counts as dead.
     """
     if sys.platform == "linux":
         _set_option(sockets, socket.SOL_SOCKET, socket.SO_RCVLOWAT, count)
@@ -133,8 +134,8 @@ def _ports(one: socket.socket) -> tuple[int, ...]:
 def spare_threads() -> None:
     """Restrict Zenoh to one thread in this process; call this before the first session.
 
-    In lockstep the services wait for one message after another. With several threads, a fifth of the time is needed to pass messages from
-    one thread to the next.
+    This makes lockstep faster, because there the services wait for one message after another. With several threads, Zenoh spends a fifth of
+    the time on passing messages from one thread to the next.
     """
     os.environ.setdefault("ZENOH_RUNTIME", _ONE_THREAD)
 
@@ -142,17 +143,18 @@ def spare_threads() -> None:
 def spare_memory() -> None:
     """Let Zenoh send and receive at most 8 kB at a time in this process; call this before the first session.
 
-    For each batch of messages that it receives, Zenoh allocates and clears a buffer of the largest size, by default 64 kB.
+    This saves memory and time: for each batch of messages that it receives, Zenoh allocates and clears a buffer of the largest possible
+    size, by default 64 kB.
     """
     _COMMON["transport/link/tx/batch_size"] = 8192
 
 
 @contextmanager
 def local_endpoint() -> Iterator[str]:
-    """Yield the address of a Unix socket in a private folder, at which a router can also listen for processes on this machine.
+    """Yield the address of a Unix socket in a private folder: a second address of a router, for processes on this machine.
 
-    It is faster than TCP on the loopback interface. Empty if such a socket is not possible. The folder is removed at the end of the `with`
-    block.
+    Such a socket is faster than TCP on the loopback interface. The address is empty if the system has no Unix sockets, or if the path of
+    the socket would be too long. The folder is removed at the end of the `with` block.
     """
     with tempfile.TemporaryDirectory(prefix="mobee-") as folder:
         path = f"{folder}/bus"
@@ -162,9 +164,10 @@ def local_endpoint() -> Iterator[str]:
 def open_client(endpoint: str, patience: float = 10.0, namespace: str = NAMESPACE, lease: float = LEASE) -> zenoh.Session:
     """Open a session with the router at `endpoint`, trying for `patience` seconds; raises BusUnreachable.
 
-    `namespace`: prefix of all keys: that of the robot, or of the filter in front of it. `lease`: time [s] without a message after which
-    this process counts as dead. If the environment names an identity, the connection is secured with it; raises BadKeys if that is not
-    possible.
+    `namespace`: prefix of all keys: "icub" for the robot itself, or the prefix under which the clients of the port filter find the robot.
+    `lease`: time [s] without a message after which this process counts as dead. If the environment variable MOBEE_KEYS is set, the
+    connection is secured with the identity of this process (`Identity.of_environment`). Raises BadKeys if its keys are missing, or if other
+    users can read them.
     """
     identity = Identity.of_environment()
     place = endpoint if identity is None else secured(endpoint)
@@ -198,10 +201,10 @@ def open_router(
     """Open a session that is the router and listens at `endpoint`; raises BusUnreachable if it cannot listen there.
 
     `lease`: time [s] without a message after which a connection counts as dead. `local_endpoint`: a second address, for processes on this
-    machine; empty: none. `identity`: identity of a secured router, which listens at the Unix socket of its folder of keys instead of
-    `local_endpoint`; None: the router is not secured. `access`: access list of a secured router, as `services.common.access.access_list`
-    returns it. A connection that sends nothing is closed after 5 s, and 10 000 connections may wait, so that silent connections do not keep
-    other processes out.
+    machine; empty: none. `identity`: identity of a secured router; None: the router is not secured. The second address of a secured router
+    is `Identity.socket`, and `local_endpoint` is not used. `access`: access list of a secured router, as
+    `services.common.access.access_list` returns it. A new connection that sends nothing is closed after 5 s. Up to 10 000 new connections
+    may wait to be accepted, so that silent connections cannot block other processes.
     """
     settings: dict[str, object] = {
         "mode": "router",

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Receives, publishes, answers and calls with messages of any type as bytes, for programs that record them and play them again."""
+"""Access to the bus for programs that record messages and replay them.
+
+Messages of any type are received and published as bytes, and so are calls and their replies.
+"""
 
 from __future__ import annotations
 

@@ -26,10 +26,10 @@ def effective_world(given: str | None, robot: str | Path) -> str:
     """Return the name or path of the world to load, or NO_WORLD ("none").
 
     Args:
-        given: a shipped world, a path, or NO_WORLD; if it is empty or None, the world is the table for the shipped iCubs (AT_TABLE), and
-            NO_WORLD for every other robot.
-        robot: the shipped name or the path from which the robot is loaded. A path is a user's robot, even if the file has the name icub:
-            only the shipped names imply the table.
+        given: a shipped world, a path, or NO_WORLD. Empty or None: the default of the robot. This is the shipped world `table` for the
+            shipped iCubs (the names in AT_TABLE), and NO_WORLD for every other robot.
+        robot: the shipped name or the path from which the robot is loaded. For a path the default is NO_WORLD, even if the file has the
+            name icub.
     """
     if given:
         return given

@@ -30,9 +30,9 @@ class Owner:
 class Action:
     """The owner of a part's goal (the right to set its attractor), and the part's newest action with its status.
 
-    `id`: id of the action; empty: none. `status`: idle, moving, settled, timeout, suspended or held; in the last two the part stands still
-    and does not follow the controller's commands. `since_k`, `start_k`: ticks at which the status and the action began. Times are in s of
-    the bus clock.
+    `id`: id of the action; empty: none. `status`: idle, moving, settled, timeout, suspended or held. If it is suspended or held, the part
+    stands still and does not follow the controller's commands; a suspended action may continue later, a held one has ended. `since_k`: tick
+    at which the status began. `start_k`: tick at which the action began. Times are in s of the bus clock.
     """
 
     def __init__(self, settle: Settle) -> None:
@@ -65,11 +65,11 @@ class Action:
         return self.status in ("moving", "suspended")
 
     def may_continue(self, t: float, gate: GateState) -> bool:
-        """Return whether the action may continue when the part is under control again.
+        """Return whether the action may continue after a hold, in which the part stands still and follows no commands of the controller.
 
-        An action without a target cannot continue. Nor can one after an emergency stop or a fault, after a hold of more than 10 s, or at
-        the sixth hold of the action: the part must not move to an old goal then. In a hold the part stands still and does not follow the
-        controller's commands. `t`: present time [s]. `gate`: state of the part's safety gate in robot_sim.
+        An action that has ended, or that has no target, cannot continue. Nor can one after an emergency stop or a fault, after a hold of
+        more than 10 s, or at the sixth hold of the action: the part must not move to an old goal then. `t`: present time [s]. `gate`: state
+        of the part's safety gate in robot_sim.
         """
         if self.target is None or gate in ("estop", "fault"):
             return False
@@ -94,8 +94,8 @@ class Action:
         Args:
             k: tick.
             t: time of the tick, s.
-            speeds: commanded speeds of the part's motors, (n_part,) rad/s; the speed of a motor that slides [m/s] must be divided by its
-                length in `mobee.robot.motor_units.fine_units`, which counts as 1 rad.
+            speeds: commanded speeds of the part's motors, (n_part,) rad/s. For a motor that slides, give the speed [m/s] divided by its
+                length [m] in `mobee.robot.motor_units.fine_units`: this length counts as 1 rad.
             accelerations: commanded accelerations, (n_part,) rad/s^2, divided likewise for motors that slide.
             continues: called when the motion has settled; if it returns True, for example because a marker still comes nearer to its
                 target, the status stays "moving".
@@ -105,12 +105,12 @@ class Action:
             self._set_status("moving" if verdict == "settled" and continues() else verdict, k)
 
     def hold(self, k: int) -> None:
-        """End the action at tick k without an outcome, because the part is not under control; the status is then "held"."""
+        """End the action at tick k because the part does not follow the control law. Its status is "held", not "settled" or "timeout"."""
         self._test = None
         self._set_status("held", k)
 
     def resume(self, k: int) -> None:
-        """Set the status "idle" (at rest, without an action) at tick k, because the part is under control again."""
+        """Set the status "idle" at tick k: the part follows the control law, but has no action."""
         self.id = ""
         self._set_status("idle", k)
 
@@ -128,7 +128,10 @@ class Action:
 
 
 def busy_owners(actions: Iterable[Action]) -> list[str]:
-    """Return the sorted names of the services that have nothing to decide in this tick, because all their parts are moving."""
+    """Return the sorted names of the owners that need not act in this tick, because the actions of all their parts continue.
+
+    An owner is a service that owns the goal of at least one part. An action continues while it is "moving" or "suspended".
+    """
     owners: dict[str, bool] = {}
     for action in actions:
         if action.owner is not None:

@@ -32,7 +32,11 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     """Posture of each part while it has no owner, rad, by name of the part; a part that is not named stays where it is."""
 
     def check_robot(self, robot: Robot) -> None:
-        """Raise MobeeError if the robot cannot take the posture, a term cannot be loaded, or a part's name cannot be used on the bus."""
+        """Raise MobeeError if these settings do not fit the robot.
+
+        They do not fit if `posture` names an unknown part, has the wrong number of values, or leaves a motor's range; if one of the
+        user-defined `terms` cannot be loaded; or if a part's name cannot be used on the bus.
+        """
         super().check_robot(robot)
         if self.terms:
             load_terms(self.terms)

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Takes the drives of all parts (the rights to command their motors) at robot_sim, and arms them, also again after each hold."""
+"""Takes the drives of all parts (the rights to command their motors) at robot_sim, and arms them, so that the motors follow the commands.
+
+If robot_sim has held a part (stopped it, so that it follows no commands), its drive is taken and armed again.
+"""
 
 from __future__ import annotations
 
@@ -24,8 +27,8 @@ class Drives:
 
     A drive is the right to command the motors of one part, which follow the commands when the drive is armed. `epochs`: for each part, the
     number of this controller's ownership of the drive, which each command must contain; 0: the drive is not armed. No method waits for an
-    answer, because the other parts need their commands while one is being armed. Times are of the monotonic clock, in lockstep of the bus
-    clock.
+    answer, because the other parts need their commands while one is being armed. In lockstep (every tick waits for all participants), the
+    times between attempts to arm are measured on the bus clock, otherwise on the monotonic clock.
     """
 
     def __init__(self, service: Service, robot: Robot) -> None:
@@ -53,7 +56,10 @@ class Drives:
         return self._service.bus.t * 1e-9 if self._service.locked else time.monotonic()
 
     def is_armed(self, part: str, state: PartStatus) -> bool:
-        """Return whether the part follows this controller's commands, by its newest state, or because it was armed in the last 0.1 s."""
+        """Return whether the part follows this controller's commands.
+
+        This is so if its newest state shows it, or if robot_sim has armed it in the last 0.1 s: the state may not show that yet.
+        """
         if self.epochs[part] == 0:
             return False
         if state.epoch == self.epochs[part] and state.gate == "armed":
@@ -62,7 +68,10 @@ class Drives:
         return self._now() < self._confirm_by[part]
 
     def forget(self) -> None:
-        """Set all epochs to 0, and abandon the take and arm calls in progress; call this at the start of a new run of robot_sim."""
+        """Set all drives to "not armed" (`epochs` 0), and ignore the answers to `take` and `arm` calls that are in progress.
+
+        Call this at the start of a new run of robot_sim.
+        """
         self.epochs = dict.fromkeys(self.epochs, 0)
         self._next_try = dict.fromkeys(self._next_try, 0.0)
         self._attempts.clear()
@@ -71,8 +80,8 @@ class Drives:
     def watch_stop(self, parts: Mapping[str, PartStatus]) -> None:
         """Read emergency stops from the bus; after a stop no part is armed until the safety gates show that the stop was reset.
 
-        The stop is published repeatedly until robot_sim has put it in force, and forgotten when it was reset at robot_sim. `parts`: the
-        newest status of each part.
+        This method publishes the stop again every 0.1 s until robot_sim obeys it, and forgets it when it was reset at robot_sim. `parts`:
+        the newest status of each part.
         """
         now = time.monotonic()
         for message in self._line.take():
@@ -92,13 +101,14 @@ class Drives:
 
     @property
     def is_stopped(self) -> bool:
-        """Whether an emergency stop is in force, as far as this controller knows."""
+        """Whether the robot is in an emergency stop, as far as this controller knows."""
         return self._stop is not None
 
     def can_arm(self, state: PartStatus) -> bool:
-        """Return whether the drive of a part may be taken and armed: no stop is in force, and its safety gate is idle, in hold or armed.
+        """Return whether the drive of a part may be taken and armed now.
 
-        `state`: status of the part. With its gate in hold, a part stands still; with its gate armed, it follows commands.
+        This is so if there is no emergency stop, and the part's safety gate in robot_sim is "idle", "hold" or "armed". `state`: status of
+        the part, with the state of its gate. In "hold" the part stands still, in "armed" it follows commands.
         """
         return self._stop is None and state.gate in ("idle", "hold", "armed")
 

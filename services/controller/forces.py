@@ -102,7 +102,10 @@ def _term(path: str) -> Term:
 
 
 class PublishedContacts:
-    """The contacts that the model published, in place of a search for contacts in `mobee.model.pose.Pose.compute_contacts`."""
+    """Gives a pose the contacts that the model service has published, so that they are not computed again.
+
+    Use it as the `finder` of `mobee.model.pose.Pose.compute_contacts`.
+    """
 
     def __init__(self, pose: Pose, contacts: Sequence[ContactItem]) -> None:
         self._pose, self._contacts = pose, contacts
@@ -110,8 +113,9 @@ class PublishedContacts:
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands) -> tuple[ContactTable, Array]:
         """Return the published contacts for one pose q (1, n) rad, and the projection of field contacts to the motors, (1, n) m^2/rad.
 
-        Fields are larger volumes around links, whose contacts cause repulsive forces. The projection is the sum of J^T (depth * normal)
-        over these contacts. `snapshot` and `reaching` are not used: the model has already applied them.
+        A field is a volume around a link, larger than the link; its contacts cause repulsive forces. The projection is the sum of
+        J^T (depth * normal) over these contacts. `snapshot` (the world) and `reaching` (the hands that reach) are not used, because the
+        model service has already used its own when it computed the contacts.
         """
         projection, numbers, reals = np.zeros_like(q), list[tuple[int, ...]](), list[list[float]]()
         for at, contact in enumerate(self._contacts):

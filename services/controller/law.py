@@ -55,7 +55,7 @@ class RobotLaw:
     # Ticks
 
     def reset(self) -> None:
-        """Reset the control law at the start of a run: the robot is at rest at home, and no forces of the model are in force."""
+        """Reset the control law at the start of a run: the robot is at rest at home, and the model's forces of the last run are dropped."""
         self.forces.forget()
         self._last_k, self._last_tick = -1, None
         self._law.reset(self._robot.home)
@@ -65,7 +65,7 @@ class RobotLaw:
         self.q, self._last_tick = q, None
 
     def count_ticks(self, k: int) -> int:
-        """Return the number of ticks from the tick of the last call in this run to tick k, at least 1."""
+        """Return the number of ticks from the k of the previous call of this method to this k, at least 1; 1 at the first call in a run."""
         ticks = max(k - self._last_k, 1) if self._last_k >= 0 else 1
         self._last_k = k
         return ticks
@@ -81,7 +81,8 @@ class RobotLaw:
     def repeat_step(self) -> Array | None:
         """Compute the last step again, with the requests that clients have made since then; return the new reference (n,).
 
-        The reference is in rad, rad/s or N m, by the modality in the settings. None: there is no step that can be repeated.
+        The reference is in rad, rad/s or N m, by the modality in the settings. None: no step was made since the last call of `measure`,
+        `brake` or `reset`, so that none can be repeated.
         """
         if self._last_tick is None:
             return None
@@ -112,7 +113,7 @@ class RobotLaw:
     # One part
 
     def rest(self, part: str) -> None:
-        """Set the commanded motion of a part that is not under control to rest at the part's measured position."""
+        """Set a part that does not follow the control law to rest: commanded velocity 0, attractor at the measured position."""
         self._law.rest(part, self.q[self._where[part]])
 
     def brake(self, part: str) -> None:
@@ -137,7 +138,7 @@ class RobotLaw:
     def follow(self, part: str, target: Array, velocity: Array) -> None:
         """Set the attractor of the part to `target` (n_part,) rad, which moves with `velocity` (n_part,) rad/s.
 
-        If it is not called again within 0.1 s, the attractor counts as at rest.
+        If it is not called again within 0.1 s of the control law's time, the attractor counts as not moving (velocity 0).
         """
         self._law.follow(part, target, velocity)
 
@@ -149,8 +150,8 @@ class RobotLaw:
     def settle_speeds(self, part: str) -> tuple[Array, Array]:
         """Return commanded velocity and acceleration of the part's motors, (n_part,) each, by which the end of a motion is detected.
 
-        Units: rad/s and rad/s^2. The values of a motor that slides are divided by its length in `mobee.robot.motor_units.fine_units`, a
-        share of its range that counts as 1 rad.
+        Units: rad/s and rad/s^2. For a motor that slides, the values in m/s and m/s^2 are divided by its length [m] in
+        `mobee.robot.motor_units.fine_units`: this length counts as 1 rad.
         """
         where = self._where[part]
         return self._law.velocity[where] / self._units[where], self._law.acceleration[where] / self._units[where]
@@ -162,7 +163,7 @@ class RobotLaw:
         self._law.reach_toward(part, marker, target)
 
     def end_reach(self, part: str) -> None:
-        """End the force of the part's reach; nothing happens if the part has no reach."""
+        """Stop pulling the marker of the part's reach to its target; nothing happens if the part has no reach."""
         self._law.end_reach(part)
 
     def is_approaching(self, part: str) -> bool:
@@ -182,9 +183,10 @@ class RobotLaw:
         self._apply_client_forces()
 
     def set_push(self, part: str, marker: str, push: Array) -> None:
-        """Set `push`, the force of a client at a marker, for a part: (3,) m/s^2, root frame (thesis eq. 5.10).
+        """Set the force of a client at a marker: `push`, (3,) m/s^2, root frame (thesis eq. 5.10).
 
-        A client is another process that commands the robot. The pushes at one marker that were set for several parts are added.
+        A client is another process that commands the robot. `part`: the part for which the client set the push; `clear_client_forces` of
+        this part ends it. If pushes at one marker were set for several parts, they are added.
         """
         self._pushes.setdefault(part, {})[marker] = push
         self._apply_client_forces()

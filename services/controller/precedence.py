@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Precedence: from whom the goal of a part may be taken while it has an owner.
+"""Precedence: which service may take the goal of a part (the right to set its attractor) while another service owns it.
 
-The rule is in this file alone. A behaviour moves only parts that no agent, client or command uses: each of these may take the part from the
-behaviour at any time, and so may a behaviour of a higher rank. The behaviour takes the part again when the part is free. Agents, clients
-and commands are of equal rank: the first one keeps the part until it releases it or ends.
+The rule is in this file alone. A service of higher rank may take the part from its owner at any time. The behaviours (`assist`, `gaze`)
+have the lowest ranks; a behaviour takes its part again when the part is free. All other services, such as agents, clients and commands,
+have the same, highest rank: the first one keeps the part until it releases it or ends.
 """
 
 from __future__ import annotations

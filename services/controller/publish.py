@@ -39,8 +39,9 @@ class Counters:
         """Return the counts of the measurement by name, for the call `stat`.
 
         "ticks": number of control steps. "late_forces": number of steps that were made before the model's forces of the tick had arrived.
-        "held_ticks": number of ticks in which a part was not under control, added over the parts. "long_gaps": number of steps that came
-        more than 3 ticks (MAX_TICKS) after the one before. "jitter_ms_p50", "jitter_ms_p99": percentiles of the jitter [ms].
+        "held_ticks": for each part, the number of ticks in which it did not follow the control law; the sum of these. "long_gaps": number
+        of steps that came more than 3 ticks (MAX_TICKS) after the one before. "jitter_ms_p50", "jitter_ms_p99": percentiles of the jitter
+        [ms].
         """
         return {
             "ticks": self.ticks,
@@ -95,7 +96,10 @@ class MotionPublisher:
 
 
 class CommandPublisher:
-    """Publishes one message per tick with the commands to all parts that follow this controller, and in lockstep the answer to the tick."""
+    """Publishes one message per tick with the commands to all parts that follow this controller.
+
+    In lockstep robot_sim waits in every tick for the answers of all participants. This class then also sends the controller's answer.
+    """
 
     def __init__(self, service: Service, ttl: int, law: RobotLaw, actions: Mapping[str, Action], drives: Drives) -> None:
         self._service, self._ttl, self._law, self._actions, self._drives = service, ttl, law, actions, drives
@@ -106,7 +110,7 @@ class CommandPublisher:
         drives.on_attempt_end(self._answer)
 
     def begin_tick(self) -> None:
-        """Forget the orders and the answer of the last tick; call this at the start of a tick or a run."""
+        """Forget the commands and the answer of the last tick; call this at the start of a tick or a run."""
         self._sent = self._to_answer = None
 
     def send(self, k: int, orders: dict[str, Order], reference: Array, answer: Answer | None = None) -> None:
@@ -135,10 +139,11 @@ class CommandPublisher:
     def send_and_answer(self, tick: Tick, fresh: bool, orders: dict[str, Order], reference: Array) -> None:
         """In lockstep, publish the commands of a tick, and answer the tick in the same message.
 
-        The answer is sent later if a part is being armed. Tick 0, which is repeated, is answered only when all parts are ready and the
-        forces are fresh. `fresh`: whether the forces of the model may be used. `orders`: for each commanded part, the epoch (number of this
-        controller's ownership of the part's drive) and the kind of command. `reference`: (n,) rad, rad/s or N m, by the modality in the
-        settings.
+        While a part is being armed, the answer is delayed. It is a message of its own then, and also if there are no commands. robot_sim
+        repeats tick 0 until all participants have answered it; it is answered only if all parts that can be armed are armed, the commands
+        have a subscriber, and the forces are fresh. `fresh`: whether the forces of the model may be used. `orders`: for each commanded
+        part, the epoch (number of this controller's ownership of the part's drive) and the kind of command. `reference`: (n,) rad, rad/s or
+        N m, by the modality in the settings.
         """
         if tick.k == 0 and not (fresh and self._is_ready(tick)):
             return

@@ -28,10 +28,11 @@ ENDED_PERIODS = 10  # of these between two messages of a reach that has ended
 class Reach:
     """The last reach of a part: a force pulls a marker to a target.
 
-    `object`: name of the target in the model's world. `stay`: whether the part stays where the force ends. `q`, `position`: measured
-    positions (n,) rad and position of the marker (3,) m, root frame, at tick `end_k`. `end_k`: tick in which the force ended; while it
-    acts, the tick of the last measurement. `settled`: whether the force ended because the part had settled. `touched`: world objects in
-    contact with the part at that time.
+    `object`: name of the target in the model's world. `stay`: whether the part stays where it is when the force ends; otherwise the
+    attractor pulls it back. `end_k`: tick at which the force ended because the part had settled or timed out; otherwise the tick of the
+    last measurement. `q`: positions of all motors (n,) rad, measured at that tick. `position`: position of the marker (3,) m, root frame,
+    at that tick. `settled`: whether the force ended because the part had settled. `touched`: world objects in contact with the part at that
+    time.
     """
 
     action_id: str
@@ -92,10 +93,10 @@ class Reaches:
                 self._law.reach(part, reach.marker, reach.target)
 
     def update(self, part: str, tick: Tick) -> None:
-        """End the force of a part's reach when the part has settled or timed out; the attractor then pulls the part back.
+        """Stop the pull of a part's reach to its target when the part has settled or timed out.
 
-        The reach is over when the part has settled again. If the reach was requested with `stay`, it is over at once, and the part stays
-        where the force ended.
+        The attractor then pulls the part back. The reach is over when the part has settled or timed out a second time. If the reach was
+        requested with `stay`, the part stays where it is instead: its attractor is set to this position, and the reach is over at once.
         """
         reach, action = self._last.get(part), self._actions[part]
         if reach is None or action.status == "moving" or reach.phase not in ("reaching", "returning"):
@@ -114,7 +115,7 @@ class Reaches:
         self._publish(part)
 
     def interrupt(self, part: str) -> None:
-        """End the part's reach, if there is one, without an outcome."""
+        """End the part's reach, if one is in progress; its phase is then "interrupted"."""
         reach = self._last.get(part)
         if reach is not None and reach.phase in ("reaching", "returning"):
             self._law.end_reach(part)
@@ -122,7 +123,10 @@ class Reaches:
             self._publish(part)
 
     def publish_regularly(self, tick: Tick) -> None:
-        """Publish all reaches again at regular intervals, for free mode, where messages may be lost."""
+        """In free mode, publish all reaches again at regular intervals, because messages may be lost there.
+
+        The intervals are 0.01 s of real time, and 0.1 s for a reach that has ended. In free mode ticks do not wait for the services.
+        """
         period = max(1, round(1e9 * PUBLISH_PERIOD * tick.rate / tick.dt))
         for part, reach in self._last.items():
             if tick.k % (period if reach.phase in ("reaching", "returning") else ENDED_PERIODS * period) == 0:

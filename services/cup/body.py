@@ -49,11 +49,11 @@ class BusBody(BusFollower):
     def follow_path(self, path: Array, speed: float, watch: BumpWatch | None = None, forces: Forces | None = None) -> Followed:
         """Move along a path (K, n) rad, and wait until the parts rest.
 
-        Returns whether the arm has bumped into something, and the posture at that time, or at the end. `speed`: share of the motors'
-        largest speed, above 0 and at most 1. `watch`: detects bumps; None: they are not detected. `forces`: function that takes a posture
-        (n,) rad and returns the forces (n,) rad/s^2 of the control law except spring and damping. The attractors are shifted such that
-        their springs cancel these forces; None: they are not cancelled. After a bump the robot moves back to the posture that it had 3 s
-        (BACK) before.
+        Returns whether the arm has bumped into something, and the posture (n,) rad at the bump, or, without a bump, at the end of the
+        motion. `speed`: share of the motors' largest speed, above 0 and at most 1. `watch`: detects bumps; None: they are not detected.
+        `forces`: function that takes a posture (n,) rad and returns the forces (n,) rad/s^2 of the control law except spring and damping.
+        The attractors are shifted such that their springs cancel these forces; None: they are not cancelled. After a bump the robot moves
+        back to the posture that it had 3 s (BACK) before the bump.
         """
         robot = self.robot
         rows = list(attractors(robot, timed(robot, np.clip(path, *robot.limits.T), self._gains, speed), self._gains, forces))
@@ -77,12 +77,15 @@ class BusBody(BusFollower):
         return Followed(False, self.q)
 
     def press(self, q: Array, seconds: float) -> None:
-        """Set the attractors of the parts to the posture q (n,) rad at once, and wait for `seconds` of the robot's clock."""
+        """Set the attractors of the parts to the posture q (n,) rad, without a path, and wait for `seconds` of the robot's clock."""
         self._step(q)
         self._wait_until(self._now + seconds)
 
     def rest_at(self, q: Array) -> None:
-        """Set the attractors of the parts to the posture q (n,) rad, and wait until no part is commanded to move, at most 1.5 s (CALM)."""
+        """Set the attractors of the parts to the posture q (n,) rad, and wait until the commanded speeds are almost 0.
+
+        The wait takes at most 1.5 s (CALM) of the robot's clock.
+        """
         self._step(q)
         self._calm()
 

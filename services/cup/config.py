@@ -34,7 +34,11 @@ class Config(WorldConfig, frozen=True, kw_only=True):
     the thing."""
 
     def check_robot(self, robot: Robot) -> None:
-        """Raise MobeeError if the robot lacks the hand, if the target stands on nothing, or if a part's name cannot be used on the bus."""
+        """Raise MobeeError if these settings do not fit the robot and the world.
+
+        They do not fit if the robot has no such `marker`, or no fingers at it; if the world has no such `target`, or no level box below it;
+        or if a part's name cannot be used on the bus.
+        """
         super().check_robot(robot)
         Hand(robot, self.marker)
         self.ground()

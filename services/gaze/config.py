@@ -27,7 +27,7 @@ class Config(BehaviourConfig, frozen=True, kw_only=True):
     """Time by which the motors' velocity lags behind the commanded velocity, in s."""
 
     def check_robot(self, robot: Robot) -> None:
-        """Raise MobeeError if the part turns no camera, or if a part's name cannot be used on the bus."""
+        """Raise MobeeError if there is no camera, if `part` turns none of the cameras, or if a part's name cannot be used on the bus."""
         super().check_robot(robot)
         self.gaze(robot)
 

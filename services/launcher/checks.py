@@ -36,9 +36,10 @@ class PortInUse(Exception):
 
 
 class SystemRuns(Exception):
-    """Raised if another system runs at the router's endpoint, or may use one of the ports.
+    """Raised if another system runs at the router's endpoint.
 
-    The message describes the other system and says how to end it.
+    Also raised if a port is in use and a system runs at the default endpoint, because that system is probably using it. The message
+    describes the other system and says how to end it.
     """
 
 

@@ -67,8 +67,8 @@ class Program:
 
     `who`: name of the service. `argv`: command. `log`: file of its standard output and error. `stage`: number of its group; groups are
     stopped in descending order. `after`: services that must be ready before it joins the system. `nice`: niceness of its process. `vital`:
-    whether the robot is stopped if the launcher gives the service up (does not restart it any more). `standby`: whether a second process
-    of it may wait, in order to replace the first. `may_end`: whether it may end by itself without a failure.
+    whether the robot is stopped if the launcher gives the service up (does not restart it any more). `standby`: whether a second process of
+    it may be started in advance, to replace the first one if that fails. `may_end`: whether it may end by itself without a failure.
     `patience`: least time without an answer [s] after which it may count as frozen. `environment`: variables that are added to the
     launcher's own.
     """
@@ -94,12 +94,12 @@ class Child:
     `since`: time of the last change of phase. `failures`: times of recent failures. `again_at`: time of the next start. `has_token`:
     whether the process has its liveliness token on the bus. `asked_at`, `answered_at`: times of the last `stat` call and the last answer.
     `asking`: a call waits for its answer. `unanswered`: number of calls in a row without an answer. `stat`: last answer of the present
-    process. `standby`: process that replaces the present process when this one fails. `has_prepared`: a standby process was started since
-    the last start. `reason`: reason of the last failure. `host`: always empty.
+    process. `standby`: process that replaces the present process when this one fails. `has_prepared`: whether the start of a standby
+    process was tried since the present process was started. `reason`: reason of the last failure. `host`: always empty.
 
     While the service does not answer `stat` calls, it is asked by `pulse` calls how many messages it has handled. `handled`: the last
-    answer. `advanced_at`: time at which this number was last seen to grow. `starvation`: time in which the service or the launcher waited
-    for a processor.
+    answer. `advanced_at`: time at which this number was last seen to grow. `starvation`: measures how long the service and the launcher
+    wait for a processor during the silence; None: no silence is recorded.
     """
 
     program: Program
@@ -143,10 +143,11 @@ class Child:
         self.phase, self.since = phase, time.monotonic()
 
     def spawn(self, launcher: str) -> None:
-        """Start the process, or use the standby process if there is one; the process waits for `release` before it joins the system.
+        """Start the process, or use the standby process if there is one.
 
-        Until then it imports its packages and reads its robot. `launcher`: value of the environment variable HELD, which names the router
-        that the process may join. Raises OSError if the operating system refuses to start the process.
+        The process imports its packages and reads its robot, then waits for `release` before it joins the system. `launcher`: value of the
+        environment variable HELD: id of the router that the process may join and, on a host that has joined, the process id of the
+        launcher. Raises OSError if the operating system refuses to start the process.
         """
         if self.standby is not None and self.standby.poll() is not None:
             self.dismiss()
@@ -155,10 +156,10 @@ class Child:
         self.note_answer(0.0)
 
     def prepare(self, launcher: str) -> None:
-        """Start a standby process, which does not join the system before `spawn` uses it.
+        """Start a standby process: a second process of the service that can replace the first without the delay of its imports.
 
-        `launcher`: value of the environment variable HELD, which names the router that the process may join. Raises OSError if the
-        operating system refuses to start the process.
+        It does not join the system before `spawn` uses it. `launcher`: as for `spawn`. Raises OSError if the operating system refuses to
+        start the process.
         """
         self.has_prepared = True
         self.standby = self._start(launcher)
@@ -189,9 +190,10 @@ class Child:
         self.answered_at, self.unanswered, self.handled, self.advanced_at, self.starvation = when, 0, None, 0.0, None
 
     def note_silence(self, now: float) -> None:
-        """Record that the service is silent.
+        """Record that the service is silent, and start to measure how long it and the launcher wait for a processor.
 
-        From the monotonic time `now` [s] until its next answer, the time in which it or the launcher waits for a processor is measured.
+        `silence` subtracts this time, so that a service on a busy machine does not count as frozen. The measurement begins at the monotonic
+        time `now` [s] and ends at the next answer.
         """
         self.starvation = Starvation((self.pid, os.getpid()), now)
 

@@ -34,10 +34,10 @@ class Connection:
     """How this launcher and its services reach the bus.
 
     `who`: name of this launcher on the bus. `endpoint`: address at which its services reach the router. `session`: the launcher's session.
-    `router`: session that is the router; None: the router is on another host. `local`: second address of the router, for services of this
-    host in lockstep (every tick waits for all participants); empty: none. `security`: keys of this run of the launcher; None: the
-    connections are not secured. `refusals`: log of what a secured router refuses. `first`: agreement with the first launcher, if this
-    launcher has joined another host; None: this launcher is the first.
+    `router`: the router, if this launcher has opened it; None: the router is on another host. `local`: second address of the router, for
+    services of this host in lockstep (every tick waits for all participants); empty: none. `security`: keys with which the connections are
+    secured; None: they are not secured. `refusals`: log of what a secured router refuses. `first`: agreement with the first launcher, if
+    this launcher has joined another host; None: this launcher is the first.
     """
 
     who: str
@@ -62,7 +62,7 @@ def open_bus(
         keys: folder of keys; None: the system is not secured.
         insecure: whether other hosts may reach the endpoint without keys.
         elsewhere: names of the services that other hosts start.
-        stack: closes the router, and the router's local address, when the stack itself is closed.
+        stack: the router and its local address are closed when the caller closes this stack.
 
     Raises:
         ConfigError: other hosts can reach the endpoint, and neither `keys` nor `insecure` is given.
@@ -111,8 +111,7 @@ def join_bus(scenario: Scenario, here: Scenario, endpoint: str, host: str, keys:
         ConfigError: `host` is not a valid name.
         PortInUse: a port of a service is in use.
         BadKeys: a key cannot be used.
-        BusUnreachable: the connection fails.
-        JoinRefused: the router does not answer, or the launchers do not agree.
+        JoinRefused: the connection fails, the first launcher does not answer, or the launchers do not agree.
     """
     who, place = name_of(host), endpoint if keys is None else secured(endpoint)
     security = None if keys is None else Security(keys, here, launcher=who)

@@ -36,7 +36,9 @@ class JoinRefused(Exception):
 
 
 class Agreement(Struct, frozen=True, kw_only=True):
-    """What the launchers of two hosts must agree on. The first launcher, whose host runs the router, sends it as JSON if called `config`.
+    """What the launchers of two hosts must agree on.
+
+    The first launcher, whose host runs the router, sends it as JSON in its answer to the call `config`.
 
     `version`: version of MoBeE. `instance`: id of the first launcher's process. `elsewhere`: services that other hosts start. `services`:
     settings of all services, by name, without settings that may differ between hosts, such as ports.
@@ -72,7 +74,8 @@ def check_names(option: str, names: Iterable[str], scenario: Scenario) -> None:
 def check_elsewhere(elsewhere: Collection[str], scenario: Scenario) -> None:
     """Raise ConfigError if other hosts cannot start the services `elsewhere`.
 
-    This is so if a name is unknown, if no service remains for this host, or if in lockstep every tick waits for one of the services.
+    This is so if a name is unknown or no service remains for this host. In lockstep it is also so if one of the services is robot_sim, or a
+    participant: every tick waits for these.
     """
     check_names("--elsewhere", elsewhere, scenario)
     if all(part.who in elsewhere for part in scenario.parts):
@@ -109,9 +112,10 @@ def _digest(path: Path) -> str:
 
 
 def request_agreement(session: Session, who: str, endpoint: str) -> Agreement:
-    """Return the agreement of the first launcher, whose router is at `endpoint`; `who`: name of this launcher.
+    """Ask the first launcher for its version and settings, which the launcher of this host must share; return them as an `Agreement`.
 
-    Raises JoinRefused if the first launcher does not answer, or has another version.
+    `endpoint`: address of the first launcher's router, for messages. `who`: name of this launcher. Raises JoinRefused if the first launcher
+    does not answer, or has another version.
     """
     give_up = time.monotonic() + _PATIENCE
     while LAUNCHER not in alive(session) and time.monotonic() < give_up:
@@ -167,9 +171,10 @@ def _shown(value: Any) -> str:
 
 
 def check_free(session: Session, who: str, only: Collection[str], endpoint: str) -> None:
-    """Raise JoinRefused if the name of this launcher (`who`) or one of the services `only` is already on the bus.
+    """Raise JoinRefused if a launcher with the name of this one, or a service that this host wants to start, is already on the bus.
 
-    `endpoint`: address of the router, for the message.
+    `who`: name of this launcher. `only`: names of the services that this host wants to start. `endpoint`: address of the router, for the
+    message.
     """
     present = alive(session)
     for name in (who, *only):

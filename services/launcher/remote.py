@@ -28,10 +28,11 @@ class Remote:
 
     Times are monotonic, in s. `who`: name. `vital`: whether the robot is stopped if the service is given up. `phase`: waiting (not yet
     present), starting, ready, failed (absent or silent) or fault (given up). `since`: time of the last change of phase. `absent_since`:
-    time at which it was last ready; None: it is ready now, or never was. `host`: name of the host that runs it; empty: not known.
-    `instance`: id of the present process; empty: there is none. `known`: id of the last process. `restarts`: number of changes to another
-    process. `asking`: a `stat` call waits for its answer. `asked_at`, `answered_at`: times of the last `stat` call and the last answer.
-    `unanswered`: number of calls in a row without an answer. `stat`: last answer. `reason`: reason of the last failure.
+    time since when it has not been ready; None: it is ready now, or never was. `host`: name of the host that runs it; empty: not known.
+    `instance`: id of the present process; empty: there is none. `known`: id of the last process, kept when it is gone. `restarts`: number
+    of changes to another process. `asking`: a `stat` call waits for its answer. `asked_at`, `answered_at`: times of the last `stat` call
+    and the last answer. `unanswered`: number of calls in a row without an answer. `stat`: last answer. `reason`: reason of the last
+    failure.
     """
 
     who: str
@@ -57,7 +58,7 @@ class Remote:
 
     @property
     def lets_others_start(self) -> bool:
-        """Whether the services that wait for this one may start: it is ready, or it is not vital and was present before."""
+        """Whether the services that wait for this one may start: it is ready, or it is not vital and has been on the bus at least once."""
         return self.phase == "ready" or (bool(self.known) and not self.vital)
 
     def enter(self, phase: Phase) -> None:

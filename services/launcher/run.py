@@ -67,14 +67,14 @@ _START_NOTICE = 5.0  # s after all are ready: a run in lockstep that is still at
 class Options:
     """The options of `mobee launch`.
 
-    `scenario`: shipped name or path. `settings`: changes of settings, each "table.field=value". `headless`: without the monitor. `page`:
-    with the monitor, even if the scenario has none. `record`: with the recorder, if the scenario has a robot. `cameras`: cameras on links,
-    each as in `services.common.cameras.CameraConfig.cameras`; with them the renderer starts, even if the scenario has none. `duration`: s
-    of real time after all services are ready; None: until the user stops it. `ticks`: in lockstep (every tick waits for all participants),
-    number of ticks; None: no limit. `json`: print the summary as JSON. `endpoint`: address of the router; None: that of the scenario.
-    `runs`: parent of the run's folder. `keys`: folder of keys; None: not secured. `insecure`: allow an address that other hosts reach,
-    without keys. `elsewhere`: services that other hosts start. `join`: address of the first host; None: this host is the first. `only`:
-    services that this host starts when it joins. `host`: name of this host when it joins.
+    `scenario`: shipped name or path. `settings`: changes of settings, each "table.field=value". `headless`: do not start the monitor (a web
+    page). `page`: start the monitor, even if the scenario does not name it. `record`: start the recorder, if the scenario has a robot.
+    `cameras`: cameras on links, each as in `services.common.cameras.CameraConfig.cameras`; with them the renderer starts, even if the
+    scenario has none. `duration`: s of real time after all services are ready; None: until the user stops it. `ticks`: in lockstep (every
+    tick waits for all participants), number of ticks; None: no limit. `json`: print the summary as JSON. `endpoint`: address of the router;
+    None: that of the scenario. `runs`: parent of the run's folder. `keys`: folder of keys; None: not secured. `insecure`: allow an address
+    that other hosts reach, without keys. `elsewhere`: services that other hosts start. `join`: address of the first host; None: this host
+    is the first. `only`: services that this host starts when it joins. `host`: name of this host when it joins.
     """
 
     scenario: str = "default"
@@ -112,9 +112,9 @@ def launch(options: Options) -> int:
 
 
 def refused_now(options: Options) -> int:
-    """Check whether a scenario can be started beside the systems that run now.
+    """Check whether a scenario can be started now: the options are valid, no system runs at its endpoint, and its ports are free.
 
-    If not, print the reason and return the exit code; else return 0.
+    If it can be started, return 0; otherwise print the reason and return the exit code.
     """
     try:
         scenario = _read(options)

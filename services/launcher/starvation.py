@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Measures how long processes wait for a processor, so that the launcher does not take a service on a busy machine for a frozen one."""
+"""Measures how long processes wait for a processor. The launcher uses it to distinguish slow services from frozen ones."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ class _Thread:
 class Starvation:
     """Measures how long several processes have waited for a processor, from the counts of the Linux scheduler.
 
-    `total`: this time [s] since the start of the measurement; 0 where Linux does not report it. It is the sum over all threads of the
-    processes, because a call passes through several threads one after the other. Between two updates it grows at most by the time passed.
+    `total`: waiting time [s] since the start of the measurement; 0 where Linux does not report it. The waiting times of all threads are
+    added, because several threads handle a call one after the other. Between two updates `total` grows by at most the time between them.
     """
 
     def __init__(self, pids: tuple[int, ...], now: float) -> None:
@@ -35,7 +35,7 @@ class Starvation:
         self._threads = {thread: _Thread(ran, waited, None) for thread, ran, waited, _ in _threads(pids)}
 
     def update(self, now: float) -> None:
-        """Continue the measurement up to the monotonic time `now` [s]. Nothing is done within 0.2 s of the last update."""
+        """Measure `total` up to the monotonic time `now` [s]. A call less than 0.2 s after the last update changes nothing."""
         if now < self._at + PERIOD:
             return
         found: dict[int, _Thread] = {}

@@ -19,8 +19,8 @@ JUST_CONFIRMED = 0.2  # s after a stop that robot_sim has published, which it re
 class EmergencyStops:
     """The launcher's part in an emergency stop. It is needed because robot_sim may be dead, frozen or starting when a stop is sent.
 
-    It writes the record that a new robot_sim reads at its start, and repeats the stop on the bus until robot_sim itself publishes it. It
-    never releases a stop.
+    It writes the stop to a file, which a new robot_sim reads at its start. It repeats the stop on the bus until robot_sim confirms it:
+    robot_sim then publishes the stop itself. This class never releases a stop.
     """
 
     def __init__(self, service: Service, record: StopRecord | None, announce: Callable[[str], None]) -> None:

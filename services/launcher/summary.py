@@ -15,11 +15,12 @@ def summarise(children: Iterable[Watched]) -> dict[str, Any]:
     """Return the measurements of a run by name, as JSON data; None for a number that was not measured.
 
     "agents": for the agent of each part, the counts of transitions, timeouts and interruptions, and the mean time of an action.
-    "..._ticks": number of ticks with the event. "pairs_watched": number of pairs of bodies that are tested for contact.
-    "rejected_commands": number of refused commands, by reason. "command_age_ticks": percentiles of the age of commands. "lockstep": ticks,
-    speed and repeatability of a run in lockstep (every tick waits for all participants). "restarts", "services": restarts and all numbers
-    of each service, by name. Lengths are in m, times in s, ages in ticks. Counters begin when every service was ready, or at the last
-    restart of their service.
+    Names such as "hold_ticks": number of ticks in which the event of the name occurred. "pairs_watched": number of pairs of bodies that are
+    tested for contact. "rejected_commands": number of refused commands, by reason. "command_age_ticks": percentiles of the age of commands.
+    "lockstep": for a run in lockstep (every tick waits for all participants), the number of ticks, the speed (times real time), whether
+    the run is repeatable, and the hash of its states. "restarts": number of restarts of each service. "services": all numbers of each
+    service. Lengths are in m, times in s, ages in ticks. Counters begin when every service was ready, or at the last restart of their
+    service.
     """
     stats = {child.who: child.stat for child in children if child.stat is not None}
     sim, model = _Numbers(stats.get("robot_sim")), _Numbers(stats.get("model"))

@@ -33,8 +33,9 @@ END_TIMEOUT = 2.0  # s from SIGTERM to SIGKILL
 class Supervisor:
     """Starts and supervises the child processes of the launcher. All its work is done in the main thread, by handlers of `service`.
 
-    `children`: the services of this host, by name. `faults`: one line for each service that was given up. `stopped_robot`: a vital service
-    was given up. `bad_settings`: a service was given up because it cannot use its settings.
+    `children`: the services of this host, by name. `faults`: one line for each service that was given up. `stopped_robot`: whether
+    the robot was stopped, because a vital service (`Program.vital`) was given up. `bad_settings`: a service was given up because it cannot
+    use its settings.
     """
 
     def __init__(

@@ -31,7 +31,7 @@ MOST_MARGIN = 0.06  # m: an object whose place is less certain is no use as a ta
 
 
 class WorldServer:
-    """Changes the world of a model as clients request by calls, and by the objects that vision perceives."""
+    """Changes the world of a model. Clients request changes by calls; vision sends the objects that it perceives."""
 
     def __init__(self, service: Service, model: Model, sigmas: float, ghosts: Collection[str] = ()) -> None:
         """`sigmas`: number of standard deviations of a perceived object's position by which its shape is enlarged.

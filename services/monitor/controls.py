@@ -83,14 +83,15 @@ class _Taken:
 class PageControls:
     """Executes the commands of all pages.
 
-    The threads of the web server call it. It executes one command at a time, except "stop", which does not wait for other commands. A call
-    returns when the other services have answered.
+    The threads of the web server call its methods. It executes one command at a time; only "stop" does not wait for other commands. A
+    method returns when the other services have answered.
     """
 
     def __init__(self, service: Service, robot: Robot, known: Known, board: Board, show_fields: Callable[[bool], None]) -> None:
         """Create the controls.
 
-        `show_fields(shown)` shows or hides the robot's fields in the 3D view; it is called in the service's main thread.
+        `known`: newest messages of other services. `board`: values of the page. `show_fields(shown)` shows or hides the robot's fields in
+        the 3D view; it is called in the service's main thread.
         """
         self._service, self._robot, self._known, self._board = service, robot, known, board
         self._show_fields = show_fields
@@ -143,11 +144,11 @@ class PageControls:
             return done
 
     def tend(self, open_pages: set[str]) -> None:
-        """Give parts back to their agents if they are no longer needed; called once per second.
+        """Give parts back to their agents if the page no longer needs them; called once per second.
 
-        If the page that has the controls is not among `open_pages` (ids), all parts that it has taken are given back. A part that has
-        reached for a target is given back 4 s after the reach has ended. A part that another client has taken no longer counts as taken by
-        the page.
+        If the page that has the controls is not among `open_pages` (ids), all its parts are given back. If the page requested a motion of
+        a hand to a target (a reach), the part is given back 4 s after the end of this motion. If another client has taken a part from the
+        page, the page gives the part up, and the part's agent is asked to resume.
         """
         with self._lock:
             self._pages = len(open_pages)
@@ -159,7 +160,7 @@ class PageControls:
             self._publish()
 
     def give_all_back(self) -> None:
-        """Give all parts that pages have taken back to their agents."""
+        """Return the control of all parts from the pages to the agents."""
         with self._lock:
             for part in list(self._taken):
                 self._give(part)

@@ -63,7 +63,10 @@ LEVELS = {"info": "INFO", "warning": "WARN", "error": "ERROR"}
 
 
 class MonitorNode:
-    """Shows the newest messages at a rate of its own. Older messages that arrived since the last update are not shown."""
+    """Shows the messages of other services on the page and writes them to the files.
+
+    Of motions, reaches, forces, contacts and images it shows only the newest message, at fixed rates. It shows all events and transitions.
+    """
 
     def __init__(self, service: Service, config: Config, robot: Robot, output: Output) -> None:
         self._service, self._output, self._robot = service, output, robot
@@ -328,7 +331,10 @@ class MonitorNode:
 
     @property
     def now(self) -> float:
-        """The robot's time [s] since the begin of the first run that this monitor has seen; later runs continue this time."""
+        """The robot's time [s] since the begin of the first run that this monitor has seen.
+
+        It never decreases: a later run begins at the time that the previous run has reached.
+        """
         return self._last
 
     def _set_time(self) -> None:

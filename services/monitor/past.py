@@ -25,7 +25,10 @@ from services.monitor.web.record import SHOWN_EVENTS, STORY, Entry, entries
 
 @dataclass(frozen=True)
 class Track:
-    """All recorded values of one name, `values`, in the order of their times, `times` [s of the robot]."""
+    """All values that were recorded under one name, in the order of time.
+
+    `times`: times of the values [s of the robot's time]. `values`: the values at these times.
+    """
 
     times: Sequence[float]
     values: Sequence[Any]

@@ -20,9 +20,9 @@ class Seen:
 
     `clock_age`: s of real time since the last tick; None: no tick yet. `mode`: mode of the clock, such as "paused". `gates`: state of the
     safety gate, by part. `held_for`: s of real time for which each part has been in hold (it stands still and follows no commands).
-    `why_held`: the controller's reason, by part. `stop`: the emergency stop in force. `services`: running services. `known`: services that
-    have run at some time. `patience`: s of real time without a tick after which the robot counts as not answering. `ended`: the monitor was
-    asked to end.
+    `why_held`: the controller's reason for the hold, by part. `stop`: the present emergency stop; None: there is none. `services`: running
+    services. `known`: services that have run at some time. `patience`: s of real time without a tick, after which the page reports that
+    the robot does not answer. `ended`: the monitor was asked to end.
     """
 
     clock_age: float | None = None

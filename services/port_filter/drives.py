@@ -32,7 +32,8 @@ class DriveServer:
     """Forwards the drive calls of clients to robot_sim, unless the reflex moves the robot back after a violation.
 
     The calls are take, arm, release, and hold, which stops a part. A client that takes a drive (the right to command a part's motors) gets
-    the epoch (number of the ownership) that robot_sim has given to the filter. `epochs`: the epoch in force, by part.
+    the epoch (number of the ownership) that robot_sim has given to the filter. `epochs`: dict from a part to the newest of these epochs;
+    0: none yet.
     """
 
     def __init__(self, service: Service, twin: Service, robot: Robot, refusal: Callable[[], str], on_arm: Callable[[], None]) -> None:
@@ -127,7 +128,8 @@ def _forwarded() -> Iterator[None]:
 class Forwarder:
     """Forwards part metadata, emergency stops and the router's liveliness token between the robot and the clients.
 
-    `service`: client of the robot. `twin`: acts as the robot in the namespace of the clients.
+    `service`: connection in the robot's namespace, in which the filter is a client of the robot. `twin`: connection in the namespace of the
+    clients (first part of all their keys), in which the filter acts as the robot.
     """
 
     def __init__(self, service: Service, twin: Service, robot: Robot) -> None:

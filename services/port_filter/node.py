@@ -54,7 +54,8 @@ class Switch:
 class FilterNode:
     """The port filter: passes commands of clients to the robot, and moves the robot back if a motion leads into contact.
 
-    `service`: connection to the robot, as a client. `twin`: acts as the robot in the namespace of the filter's clients.
+    `service`: connection in the robot's namespace, in which the filter is a client of the robot. `twin`: connection in the namespace of the
+    filter's clients (first part of all their keys), in which the filter acts as the robot.
     """
 
     def __init__(self, service: Service, twin: Service, config: Config, robot: Robot) -> None:

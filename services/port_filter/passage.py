@@ -77,7 +77,11 @@ class CommandStream:
         self._seq += 1
 
     def client_seq(self, seq: int) -> int:
-        """Return the number that the client gave to the command `seq` of this stream; -1 if the command is not from a client."""
+        """Return the number that a client gave to its command, before the command was forwarded.
+
+        `seq`: number of the command in this stream. The result is -1 if the command is not from a client, or if it is not one of the newest
+        1000 (MAX_REMEMBERED) commands of clients.
+        """
         return self._client_seq.get(seq, -1)
 
 
@@ -87,8 +91,9 @@ MAX_STATE_AGE = 100_000_000  # ns; a pose with an older state of a part is not c
 class Streams:
     """Passes the states of all parts to the clients, and the clients' commands to robot_sim.
 
-    `commands`: the stream of commands to robot_sim, by part. `is_stale`: the newest states are too old to check the pose, so that commands
-    are refused. `answered(commands, answer)`: called when a client's message with commands also contains its answer to a tick, in lockstep.
+    `commands`: dict from a part to its stream of commands to robot_sim. `is_stale`: True if the newest state of a part is more than 0.1 s
+    older than the tick; the pose is then not checked, and commands are refused. `answered`: function that is called with the message and
+    the answer when, in lockstep, a client's `Commands` message also contains its answer to a tick.
     """
 
     def __init__(
@@ -122,7 +127,10 @@ class Streams:
         self.is_stale = tick.t - min(state.t for state in tick.parts.values()) > MAX_STATE_AGE
 
     def publish(self, tick: Tick) -> None:
-        """Publish a tick to the clients; a part that the reflex controls is shown in hold (not under command)."""
+        """Publish the robot's tick to the clients.
+
+        While clients may not command because of the reflex, the message shows each armed part in the state hold, without a command.
+        """
         parts = {part: self._for_clients(part, state) for part, state in tick.parts.items()}
         self._tick.put(dt=tick.dt, mode=tick.mode, rate=tick.rate, q=tick.q, parts=parts)
 
@@ -131,12 +139,15 @@ class Streams:
         return self._q
 
     def follows(self, part: str) -> bool:
-        """Return whether the filter owns the part and has armed it, by the newest tick, so that it follows the filter's commands."""
+        """Return whether a part follows the filter's commands: in the newest tick it is armed, and the filter is its owner."""
         state = self._parts.get(part)
         return state is not None and state.gate == "armed" and state.epoch == self._epochs[part]
 
     def forget_moves(self) -> None:
-        """Forget the clients' moves, because the clients have lost control. Their next position command begins a new move."""
+        """Forget the last commanded positions of the clients, because the clients have lost control.
+
+        The next position command to a part therefore counts as the beginning of a new move (`MoveDetector`).
+        """
         for moves in self._moves.values():
             moves.forget()
 

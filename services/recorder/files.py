@@ -22,8 +22,9 @@ _CHUNK = 4_000_000  # bytes; a chunk ends earlier, at every flush
 class Channel:
     """The messages of one key in one encoding. Channels with equal fields are the same channel.
 
-    `topic`: the key. `encoding`: encoding of the messages: msgpack, json or cdr. `about`: the encoding string on the bus, for messages that
-    are recorded unchanged. `schema`: name of the schema; empty: none. `schema_encoding`, `definition`: format and content of the schema.
+    `topic`: the key. `encoding`: short name of the encoding: msgpack, json or cdr. `about`: for messages that are recorded unchanged, the
+    full encoding string that was sent with them on the bus (`bus_schema.encoding_of`); empty for copies. `schema`: name of the schema;
+    empty: none. `schema_encoding`, `definition`: format and content of the schema.
     """
 
     topic: str
@@ -82,7 +83,8 @@ class Files:
     def flush(self) -> None:
         """Hand all data to the operating system, so that they are kept even if this process is killed.
 
-        A file that is larger than 1/128 (FILES) of the largest size of the recording is ended; the next message begins a new file.
+        If the present file is then larger than `largest` / 128 (FILES), it is closed, and the next message begins a new file. `largest` is
+        the size limit of all files together.
         """
         if self._file is None:
             return
@@ -95,7 +97,7 @@ class Files:
         self._remove_oldest()
 
     def close(self) -> None:
-        """End the present file with its index."""
+        """Write the index of the present file, and close the file; nothing is done if no file is open."""
         if self._file is not None:
             file, self._file = self._file, None
             with file:

@@ -70,7 +70,7 @@ _header = msgspec.msgpack.Decoder(_Header)
 def sender_of(payload: bytes) -> tuple[str, int] | None:
     """Return the name of the sender and the sequence number in the header of a message (`payload`); None if the header cannot be decoded.
 
-    Such a message is recorded nevertheless.
+    The recorder also records messages whose header cannot be decoded.
     """
     try:
         header = _header.decode(payload)
@@ -92,8 +92,8 @@ def queues(everything: bool, locked: bool) -> dict[str, int]:
     """Return the key expressions of the streams to record, each with the number of messages that may wait in its queue.
 
     `everything`: also the streams that are published only for subscribers (FOR_SUBSCRIBERS). `locked`: in lockstep the queues are longer.
-    Streams with few messages get short queues: Zenoh allocates 0.25 kB per place, and the memory of each place is used when the first
-    message is put there, so a long queue would grow for hours.
+    Streams with few messages get short queues, because each place in a queue takes 0.25 kB of memory when its first message is stored
+    there. With long queues, such streams would fill new places, and the recorder's memory would grow, for hours.
     """
     most, others = (LOCKED_CAPACITY, OTHER_LOCKED_CAPACITY) if locked else (CAPACITY, OTHER_CAPACITY)
     recorded = (cls for cls in streams() if everything or cls not in FOR_SUBSCRIBERS)
@@ -101,9 +101,10 @@ def queues(everything: bool, locked: bool) -> dict[str, int]:
 
 
 def frequent_keys(parts: Iterable[str], everything: bool) -> list[str]:
-    """Return the keys that contain a variable, such as {part}, and have a message in every tick.
+    """Return the keys of the streams that have one key for each part, such as "{part}/motion", and may have a message in every tick.
 
-    `parts`: parts of the robot. `everything`: also the streams that are published only for subscribers (FOR_SUBSCRIBERS).
+    The key of the model's forces, "model/forces", is also among them. `parts`: parts of the robot. `everything`: also the streams that are
+    published only for subscribers (FOR_SUBSCRIBERS).
     """
     recorded = (cls for cls in PER_TICK if cls.stream.variable and (everything or cls not in FOR_SUBSCRIBERS))
     return [cls.stream.key(name) for cls in recorded for name in (("model",) if cls is Forces else parts)]
@@ -133,8 +134,8 @@ class RecorderNode:
     def lower_priority(self) -> None:
         """Lower the priority of the main thread below all services.
 
-        Call this when the recorder is ready, because others wait for its start. In lockstep nothing is done: there no tick can be late, and
-        the run can be played again only if no message is lost.
+        Call this only after the recorder is ready: other services wait for its start, so the start must be fast. In lockstep the priority
+        is not changed, for two reasons: no tick can be late, and a lost message would make it impossible to play the run again.
         """
         if self._service.locked:
             return

@@ -22,9 +22,9 @@ NO_CONTACT = SolidContact()
 class BulletBackend:
     """The upper body of iCub v2.5 with gravity in PyBullet. Fingers and eyes have no physics, only the motor model.
 
-    A joint is a velocity constraint whose largest torque is that of the motor, so the servo carries the weight, as on the real robot. In
-    torque mode the commanded torque acts on the joint through a gear (bullet_torque.py), and must include the torque that carries the
-    weight.
+    PyBullet moves each joint at the velocity that the motor model computes, with at most the largest torque of the motor. The joint
+    therefore carries the weight by itself, as with the servo of the real robot. In torque mode the commanded torque acts on the joint
+    through a gear (bullet_torque.py), and must include the torque that carries the weight.
     """
 
     name = "pybullet"

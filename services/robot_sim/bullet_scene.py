@@ -29,9 +29,9 @@ TABLE = "table"  # in the list it stands for every obstacle of the world
 class SolidPairs(Struct, frozen=True, forbid_unknown_fields=True):
     """The list of pairs of links whose contacts count as solid contacts, and how the list was made.
 
-    `always`: pairs that are listed in any case: hands and forearms against torso, head, other arm and table. `apart`: the other pairs,
-    whose convex hulls were at least `distance` [m] apart in all of `poses` random poses within the limits, drawn with the seed `seed`.
-    `model`: the robot's name in icub-models.
+    `always`: pairs that are listed without a test, because the robot must avoid their contacts: hands and forearms against torso, head,
+    other arm and table. `apart`: pairs that are listed because of a test: their convex hulls were more than `distance` [m] apart in all of
+    `poses` random poses within the limits. `seed`: of these random poses. `model`: the robot's name in icub-models.
     """
 
     model: str
@@ -46,7 +46,10 @@ class SolidPairs(Struct, frozen=True, forbid_unknown_fields=True):
         return {frozenset(pair) for pair in self.always + self.apart if TABLE not in pair}
 
     def against_table(self) -> list[str]:
-        """Return the links whose contacts with obstacles count, sorted by name."""
+        """Return the links whose contacts with obstacles count as solid contacts, sorted by name.
+
+        In the list, "table" stands for every obstacle of the world.
+        """
         return sorted(first if second == TABLE else second for first, second in self.always + self.apart if TABLE in (first, second))
 
 

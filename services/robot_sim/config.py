@@ -78,8 +78,8 @@ class Config(WorldConfig, frozen=True, kw_only=True):
     def check_robot(self, robot: Robot) -> None:
         """Raise MobeeError if the back-end cannot move the robot with these motors, or if a part's name cannot be used on the bus.
 
-        With `motors` = "identified", parameters must exist for this robot. Each pattern of `torques` must match a motor, and
-        `encoder_errors` must be finite errors of motors.
+        With `motors` = "identified", parameters must exist for this robot. Each pattern of `torques` must match a motor. Each name in
+        `encoder_errors` must be a motor, and each error must be finite.
         """
         super().check_robot(robot)
         errors_of(robot, self.encoder_errors)

@@ -29,8 +29,9 @@ from services.common.service import CallRefused
 class Limits:
     """Limits of the motors of a part, each of shape (n_part,).
 
-    `lower`, `upper`: rad. `velocity`: rad/s. `acceleration`: rad/s^2. `torque`: N m. `fine`: factor for thresholds in rad: 1 for
-    a motor that turns; for a motor that slides, the length [m] that counts as 1 rad (`mobee.robot.motor_units.fine_units`).
+    `lower`, `upper`: rad. `velocity`: rad/s. `acceleration`: rad/s^2. `torque`: N m. `fine`: factor that converts a small threshold from
+    rad to the motor's own unit. It is 1 for a motor that turns, and a length in m for a motor that slides
+    (`mobee.robot.motor_units.fine_units`).
     """
 
     lower: Array
@@ -58,8 +59,8 @@ class Order(Struct, frozen=True, eq=False):
     """A command to one part, as it arrived in `Command` or `Commands`.
 
     `src`: sender. `seq`: sequence number of the message. `epoch`: number of the sender's ownership of the part. `re_k`: tick that the
-    command answers. `reference`: (n_part,) rad, rad/s or N m, by `mode`. `ttl`: time [ms] from the start of tick `re_k` after which the
-    command is not in force any more; in lockstep a fixed number of ticks counts instead.
+    command answers. `reference`: (n_part,) rad, rad/s or N m, by `mode`. `ttl`: time [ms] from the start of tick `re_k` after
+    which the part no longer follows the command. In lockstep this time is always 3 ticks (LOCKED_TTL) instead.
     """
 
     src: str
@@ -107,7 +108,7 @@ _EXACT = 1.0 + 1e-9  # factor for rounding: a reference at the limit is within t
 
 
 class Admission:
-    """The checks of the commands to one part before they are in force; each check raises Refused with its reason."""
+    """The checks that a command to one part must pass before the part follows it; each check raises Refused with its reason."""
 
     def __init__(self, part: str, limits: Limits, dt: float, max_ticks: int | None) -> None:
         """Set the limits.
@@ -125,7 +126,8 @@ class Admission:
     def check(self, order: Order, k: int) -> None:
         """Raise Refused if an order that arrives in tick k is not valid.
 
-        Checked are the number of its references, their limits, the age of the order in ticks, and its ttl.
+        The method checks that the reference has one value for each motor, that the values are within the limits, that the tick that the
+        order answers is neither in the future nor too long ago, and that the ttl is between 1 and 1000 ms.
         """
         reference = order.reference
         if reference.shape != self._lower.shape:
@@ -220,8 +222,8 @@ class Shaper:
     def runs_out(self, q: Array, velocity: Array) -> bool:
         """Return whether a motor is too fast to stop before its position limit.
 
-        An excess of less than the largest change of velocity in one tick is tolerated. `q` [rad], `velocity` [rad/s]: measured, (n_part,)
-        each.
+        A velocity that is too high by less than its largest change in one tick is tolerated. `q` [rad], `velocity` [rad/s]: measured,
+        (n_part,) each.
         """
         return self._asked.runs_out(q, velocity)
 
@@ -245,7 +247,10 @@ HOLD = Drive("hold")
 
 
 class InForce(Struct, frozen=True):
-    """A command that was accepted, and the time at which it ends, `expires`, ns of the monotonic clock."""
+    """The command that a part follows at present.
+
+    `expires`: time at which its ttl is over, ns of the monotonic clock; not used in lockstep.
+    """
 
     order: Order
     expires: int
@@ -256,8 +261,8 @@ class Gate:
 
     States: idle (no owner), hold (the part brakes and stands still), armed, fault, estop; the part moves only when armed. Each new owner
     gets a new epoch, a number that its calls and commands must contain. Commands are admitted between ticks; `tick` returns what the motors
-    do. A command is in force until the next one, or until its ttl is over; then the part brakes at full deceleration, holds where it came
-    to rest, and must be armed again.
+    do. The part follows a command until the next one is admitted. If the ttl of the command is over before that, the part brakes at full
+    deceleration, holds where it came to rest, and must be armed again.
     """
 
     def __init__(
@@ -369,13 +374,16 @@ class Gate:
             self._enter("fault" if self.faults else "hold", "emergency stop reset")
 
     def fail(self, bit: int, why: str) -> None:
-        """Record a fault of the part, which only a new run clears; `bit`: bit of `faults` that is set; `why`: reason, for the event."""
+        """Record a fault of the part, which only a new run clears.
+
+        `bit`: value of the fault in the bit field `faults`, a power of two. `why`: reason, for the event.
+        """
         self.faults |= bit
         if self.state not in ("fault", "estop"):
             self._enter("fault", why)
 
     def admit(self, order: Order, k: int, now: int, q: Array) -> None:
-        """Put an order in force from the next tick on, or raise Refused with the reason.
+        """Accept an order, which the part follows from the next tick on; raise Refused with the reason if it is not admitted.
 
         `k`: the present tick. `now`: time, ns of the monotonic clock. `q`: measured positions of the part's motors, (n_part,) rad.
         """

@@ -53,15 +53,21 @@ class Guard:
 
     @property
     def stop_reason(self) -> str:
-        """The emergency stop in force as a text: who stopped the robot, when and why; empty if there is none."""
+        """The present emergency stop as a text: who stopped the robot, when and why; empty if the robot is not stopped."""
         return "" if self._stop is None else str(self._stop)
 
     def on_answer(self, handler: Callable[[str, int, Answer], None]) -> None:
-        """Set the handler of answers to ticks that arrive in a `Commands` message in lockstep; called with service, tick and answer."""
+        """Set the function that gets the answers to ticks which arrive in `Commands` messages, in lockstep.
+
+        `handler`: called with the name of the service that answers, the number of the tick, and the answer.
+        """
         self._on_answer = handler
 
     def reset(self) -> None:
-        """Begin a new run: all safety gates are idle and without owner. An emergency stop stays in force."""
+        """Begin a new run: all safety gates are idle and without owner.
+
+        An emergency stop is not ended: if there is one, the gates are in the state estop.
+        """
         self.gates = {part: self._gate(part, gate.epoch) for part, gate in self.gates.items()}
         self._waiting.clear()
         self._runs.add(self._service.bus.run)
@@ -69,7 +75,10 @@ class Guard:
             self._stop_gates(self._stop)
 
     def tick(self, k: int) -> None:
-        """Give the motors the commands that are in force in tick k."""
+        """Command all motors in tick k: a part follows its present command, or brakes and stands still if it has none.
+
+        Before that, the method checks for a new emergency stop and, if not in lockstep, checks and admits the newest `Commands` message.
+        """
         self._check_stop()  # before commands, and past an inbox that a flood has filled
         now = time.monotonic_ns()
         motors = self._backend.motors

@@ -44,9 +44,9 @@ def require_simulated(robot: Robot) -> None:
 
 
 def unmoved(world: World) -> tuple[str, ...]:
-    """Return a note for the user about the movable objects of a world, for a back-end in which pushed objects do not move.
+    """Return a note for the user that the movable objects of a world do not move in this back-end when they are pushed.
 
-    Empty if the world has no movable objects.
+    The tuple has this one text, with the names of the objects; it is empty if the world has no movable objects.
     """
     names = ", ".join(name for name, thing in world.objects.items() if thing.movable)
     return (f'objects with a mass do not move here when they are pushed ({names}): backend = "mujoco" moves them',) if names else ()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lockstep in robot_sim: waits for the participants, and records whether the run is repeatable."""
+"""Lockstep in robot_sim: every tick waits for the answers of the participating services; events that break repeatability are counted."""
 
 from __future__ import annotations
 
@@ -46,9 +46,10 @@ class Lockstep:
         return f"waits for {', '.join(absent)}" if absent else "all participants are ready"
 
     def wait(self, k: int) -> None:
-        """Wait until tick k is answered, then admit the commands for it, in an order that does not depend on their arrival.
+        """Wait for the answers of the present participants to tick k, then give the waiting commands to the safety gates.
 
-        Parts that depend on a late participant are put in hold: they brake and stand still.
+        The order of the commands does not depend on their arrival. If a participant does not answer in time, the parts that it owns are put
+        in hold (they brake and stand still); if it is the model, all parts are put in hold.
         """
         for who in self._barrier.wait(k):
             self._guard.hold_dependents(who)

@@ -27,9 +27,10 @@ def make_backend(config: Config, robot: Robot) -> Backend:
 
 
 def motor_parameters(config: Config, robot: Robot) -> MotorParameters:
-    """Return the parameters of the motors that the configuration names.
+    """Return the parameters of the simulated motors, as the configuration sets them.
 
-    Raises UnknownName for `motors` = "identified" and a robot whose motors were not identified.
+    With `motors` = "identified" they are those that were fitted to the responses of this robot (docs/plant.md). In this case UnknownName is
+    raised for a robot without such parameters.
     """
     if config.motors == "identified":
         return replace(MotorParameters.identified(robot.name), substep=config.substep)

@@ -25,9 +25,9 @@ Mask = NDArray[np.bool_]
 class MujocoBackend:
     """All joints of any robot with gravity in MuJoCo; the base of the robot is fixed.
 
-    A joint is a velocity constraint whose largest torque is that of the motor, so the servo carries the weight. In torque mode the
-    commanded torque acts through a gear with the inertia and the friction of the control law, and must include the torque that carries the
-    weight.
+    Except in torque mode, a motor is a constraint on the velocity of its joint. The torque of this constraint is limited to the
+    largest torque of the motor, and holds the robot against gravity. In torque mode the commanded torque acts through a gear with the
+    inertia and the friction of the control law; the command must include the torque against gravity.
     """
 
     name = "mujoco"
@@ -75,7 +75,7 @@ class MujocoBackend:
         return self._world
 
     def step(self, dt: float) -> None:
-        """Advance by one tick; `dt` [s] must be the one that was given at the start."""
+        """Advance by one tick; `dt` [s] must be the `dt` that the constructor got."""
         self._deepest.clear()
         for _ in range(self._substeps):
             self._advance(self._substep)
@@ -112,8 +112,8 @@ class MujocoBackend:
     def gap(self) -> float:
         """Return the smallest distance of hands and forearms from the obstacles, m; 0 in contact, -1 without obstacles.
 
-        For a robot without hands and forearms, the last link of each chain counts. A distance of more than MAX_GAP (2 m) is returned as 2
-        m.
+        If the robot has no links of hands and forearms, the distance of the last link of each chain is measured instead. A distance of more
+        than MAX_GAP (2 m) is returned as 2 m.
         """
         if not self._obstacles or not self._near:
             return -1.0

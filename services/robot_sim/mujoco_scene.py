@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A robot and its world in MuJoCo: all joints, the solids that the model tests, masses, and motors as constraints of velocity."""
+"""A robot and its world in MuJoCo: joints, masses, solids that can collide, and motors, which are constraints on joint velocities."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ class MujocoScene:
     """The robot and its world in MuJoCo: the compiled model, its state, and the degrees of freedom and constraints of each motor.
 
     A motor acts on one of its joints: the one with the largest absolute scale. The other joints of the motor follow this joint. A motor is
-    a constraint that brings its joint to a given velocity with a limited torque. It uses MuJoCo's dry friction of joints, whose desired
-    velocity is normally 0, but here is set for every substep.
+    a constraint that brings its joint to a given velocity with a limited torque. It is made with MuJoCo's dry friction of joints. Dry
+    friction normally brings a joint to velocity 0; here the back-end sets another velocity in every substep.
 
     Arrays of the n motors: `scale`, `offset` (n,): joint position = scale * motor position + offset. `dofs` (n,): degree of freedom of the
     joint in MuJoCo. `rows` (n,): row of the motor's constraint in MuJoCo.
@@ -248,7 +248,8 @@ class MujocoScene:
 def reflected_inertia(motor: Motor) -> float:
     """Return the inertia [kg m^2] of a motor's rotor as it acts behind the gear.
 
-    It is INERTIA, that of the control law, or less for a motor that is too weak to accelerate this inertia.
+    It is the inertia INERTIA of the control law (0.5 kg m^2), but at most max_torque / (2 max_acceleration) of the motor: half of the
+    motor's largest torque is then enough for its largest acceleration.
     """
     return min(INERTIA, 0.5 * motor.max_torque / motor.max_acceleration)
 
@@ -259,7 +260,10 @@ def _share(amount: float, motor: Motor, scale: float) -> float:
 
 
 def touching_at_home(robot: Robot, world: World) -> dict[frozenset[str], float]:
-    """Return the depth [m] of each contact that the model finds at home, by the pair of solids (set of two names)."""
+    """Return the pairs of solids that overlap in the home posture: a dict from the set of their two names to the depth [m].
+
+    The contacts are those of `mobee.Model`.
+    """
     contacts = Model(robot, world).evaluate(robot.home).contacts
     return {frozenset((one.first, one.second)): one.depth for one in contacts if one.kind == "solid"}
 

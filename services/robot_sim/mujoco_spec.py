@@ -25,12 +25,12 @@ GEOMS = {
 
 
 def link_name(link: int) -> str:
-    """Return the name of a link's body in MuJoCo. It has the link's number, because a world object may have the name of a link."""
+    """Return the name of a link's body in MuJoCo: "link" and the link's number, since a world object may have the same name as a link."""
     return f"link{link}"
 
 
 def joint_name(joint: int) -> str:
-    """Return the name of a joint in MuJoCo, which has the joint's number."""
+    """Return the name of a joint in MuJoCo: "joint" and the number of the joint."""
     return f"joint{joint}"
 
 
@@ -38,8 +38,8 @@ def add_tree(spec: Any, robot: Robot, weigh: Callable[[Any, int, Array], None]) 
     """Add a body for each link of the robot, and its joint, to a MuJoCo specification.
 
     `spec`: the specification (mujoco.MjSpec). Returns the bodies, and the origins (L, 3) m of their frames in the root frame at zero pose.
-    The axes of all frames are those of the root frame at zero pose. `weigh(body, link, origin)`: called for each link, to give its body a
-    mass.
+    The axes of all frames are those of the root frame at zero pose. `weigh(body, link, origin)`: called for each link, to give its
+    body a mass; `link`: number of the link, `origin`: (3,) m, origin of the body's frame in the root frame at zero pose.
     """
     bodies = [spec.worldbody.add_body(name=link_name(0))]
     origins = [np.zeros(3)]

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs robot_sim. In every tick come the gates, the clock, the physics, and then the state of each part at its own sampling time.
+"""Runs robot_sim, tick by tick.
 
-In lockstep the states are read and published before the clock.
+A tick has four steps: the safety gates command the motors; the messages `Tick` and `Clock` are published; the physics advances by a tick;
+then each part is read at its own sampling time, and its state is published. In lockstep all parts are read and published before `Tick`.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Renders the pictures of the cameras in a process of its own, `python -m services.robot_sim.renderer`.
 
-Reads: clock, {part}/state, sim/truth (where the simulator has its objects); with optics = "dragonfly" tick in place of the states.
+Reads: clock, {part}/state, sim/truth (true poses of the objects). With optics = "dragonfly", tick is read in place of {part}/state.
 Writes: vision/image/{camera}, vision/camera/{camera}; only while there are subscribers.
 
 Pictures with optics = "dragonfly" (imperfect cameras) are published after a latency. They are drawn during this time, as soon as the true

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The renderer's imperfect cameras: pictures of the simulator's true posture, with an inexact time stamp and the encoder values at it."""
+"""The renderer's imperfect cameras: pictures of the true posture, with an inexact time stamp and the encoder values at this stamp."""
 
 from __future__ import annotations
 
@@ -77,19 +77,22 @@ class ImperfectCameras:
     def exposed(self) -> int:
         """The middle of the newest exposure that can be drawn, ns of the bus clock; 0 if there is none.
 
-        An exposure can be drawn when the truth is known until its end.
+        An exposure can be drawn when messages `sim/truth` with the true postures up to its end have arrived.
         """
         return round(1e9 * (self._truths[-1][0] - 0.5 * self.settings.exposure)) if self._truths else 0
 
     @property
     def arrived(self) -> int:
-        """The time, ns of the bus clock, of the newest exposure whose pictures have left the camera after its latency."""
+        """The time of the newest tick minus the true latency of the cameras, ns of the bus clock.
+
+        If the middle of an exposure is not later than this time, its pictures have left the cameras.
+        """
         return round(1e9 * (self._ticked - self.settings.latency - self.errors.latency))
 
     def postures(self, t: float) -> list[Array]:
         """Return the true postures (n,) rad at several moments of the exposure whose middle is at the time t [s].
 
-        Raises InvalidValue if the truth around that time is not known.
+        Raises InvalidValue if messages `sim/truth` around that time are missing.
         """
         return [self._true_at(t + moment) for moment in self._cameras.moments]
 

@@ -99,7 +99,10 @@ class Sensors:
 
     @property
     def hash(self) -> str:
-        """SHA-256, in lockstep (every tick waits for all participants), over q, dq, mode and gate of every part at every tick from 1 on."""
+        """SHA-256 of q, dq, mode and gate of every part, at every tick from 1 on: the same for two runs with the same states.
+
+        `digest` adds a tick. robot_sim calls it only in lockstep (every tick waits for all participants).
+        """
         return self._hash.hexdigest()
 
     def begin(self, motors: Motors) -> None:
@@ -109,8 +112,9 @@ class Sensors:
     def sample(self, shares: Sequence[tuple[float, str]], motors: Motors, gates: Mapping[str, Gate]) -> None:
         """Read parts at their times in this tick, by interpolation between its start (`begin`) and its end, with encoder noise.
 
-        `shares`: pairs of the share of the tick (0 to 1) and the part. Velocities are those of the motors. The readings of each part, a
-        sample, are published on `{part}/state`. `gates`: the safety gate of each part, whose state is published, too.
+        `shares`: pairs (share, part): the part is read when this share of the tick (0 to 1) has passed. The velocities have no noise, and
+        are those of the motors before the backlash. The readings of each part are published on `{part}/state`. `gates`: the safety gate of
+        each part, whose state is published, too.
         """
         q, dq, tau = motors.q, motors.motor_velocities, motors.efforts
         noise = motors.encoders(self._bus.k, self._dt) - q + self._errors
@@ -132,9 +136,10 @@ class Sensors:
             self._report(part, self._bus.t + round(share * self._dt * 1e9), gates[part])
 
     def sample_now(self, motors: Motors, gates: Mapping[str, Gate]) -> None:
-        """Read all parts as they are now, at the beginning of the tick, and publish the readings on `{part}/state`.
+        """Read all parts at the same time, the beginning of the present tick, and publish the readings on `{part}/state`.
 
-        Tick 0, in which nothing moves, is read without noise. `gates`: the safety gate of each part, whose state is published, too.
+        The encoder positions have noise, except in tick 0, in which the robot does not move yet. `motors`: the simulated motors. `gates`:
+        the safety gate of each part, whose state is published, too.
         """
         k = self._bus.k
         self._q = (motors.encoders(k, self._dt) if k else motors.q) + self._errors
@@ -143,7 +148,7 @@ class Sensors:
             self._report(part, self._bus.t, gate)
 
     def publish(self, mode: Literal["free", "lock", "paused"], dt: int, rate: float) -> None:
-        """Publish the start of the tick (`Tick`), if every part has been read.
+        """Publish the message `Tick`, which starts the tick; publish nothing while parts have not been read since the reset.
 
         `mode`: free, lock (lockstep) or paused. `dt`: the tick, ns. `rate`: simulated seconds per second of real time.
         """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Largest torques of motors that differ from those of the robot's file, such as the weak ones of fingers."""
+"""Gives a robot other largest torques of motors than its file has, for instance smaller ones for the fingers."""
 
 from __future__ import annotations
 

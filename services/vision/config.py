@@ -48,7 +48,7 @@ class Config(CameraConfig, frozen=True, kw_only=True):
     def things(self) -> list[Thing]:
         """Return the things to look for: the coloured targets of the world.
 
-        Raises InvalidValue if there is none, and the errors of the world's file.
+        Raises InvalidValue if there is none, and MobeeError if the world cannot be read.
         """
         found = things_in(self.load_world())
         if not found:

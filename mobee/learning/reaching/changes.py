@@ -30,7 +30,7 @@ class Detector(Protocol):
     """Decides from a sequence of outcomes when the world has changed. Its decisions must depend only on this sequence."""
 
     def add(self, learned: float, unknown: float) -> int | None:
-        """Process one outcome; if a change is detected now, return the number of outcomes since the change, with this one, else None.
+        """Process one outcome; if it reveals a change, return the number of outcomes since the change, this one included; otherwise None.
 
         `learned`: probability, or density, of the outcome according to what was learned. `unknown`: its probability, or density, if nothing
         was learned.
@@ -46,8 +46,9 @@ class RunLength:
     """Bayesian online change point detection (Adams and MacKay 2007): a change is detected when it is more probable than no change.
 
     Between two changes, a constant share of the outcomes contradicts what was learned and has the probability `unknown`; the others have
-    the probability `learned`. The share and the probability of a change are not settings: they are integrated over `SHARES` (0.01 to 0.95)
-    and `HAZARDS` (0.01 to 0.00001). A change to a smaller share is not reported, because it occurs when the learner learns.
+    the probability `learned`. The share and the probability of a change are unknown, not settings: the detector weighs all values in
+    `SHARES` (0.01 to 0.95) and `HAZARDS` (0.01 to 0.00001) by their probability. A decrease of the share is not reported, because it
+    occurs without a change of the world: the predictions of the learner become better.
     """
 
     def __init__(self) -> None:
@@ -58,7 +59,7 @@ class RunLength:
         self._before: Array = self._share[0]  # (shares,) in the run that is certain
 
     def add(self, learned: float, unknown: float) -> int | None:
-        """Process one outcome; if a change is detected now, return the number of outcomes since the change, with this one, else None.
+        """Process one outcome; if it reveals a change, return the number of outcomes since the change, this one included; otherwise None.
 
         `learned` and `unknown`: probability or density of the outcome, as in `Detector.add`.
         """
@@ -107,7 +108,7 @@ class RewardScale:
 
     @property
     def variance(self) -> float:
-        """The variance of the rewards of one reach around their mean; before there are repeated reaches, 0.05^2."""
+        """The variance of the rewards of one reach (one state and target) around their mean; 0.05^2 until a reach has been repeated."""
         return self._square / self._weight
 
     def add(self, state: int, target: Array, reward: float) -> None:
@@ -139,7 +140,8 @@ class WorldChanges:
     Args:
         make_detector: makes the detector, which decides when the world has changed.
         planning: gives the probabilities of the outcomes of transitions.
-        predictor: gives the standard deviations of rewards; if it has none, only reaches that repeat an earlier reach are informative.
+        predictor: gives the standard deviations of rewards. If it gives none, a reach is evidence for or against a change only if an
+            earlier reach had the same state and target.
         failures: the memory of failures; its method `change` is called with the number of transitions since the change.
     """
 
@@ -154,10 +156,11 @@ class WorldChanges:
         self._is_reach: list[bool] = []  # of all outcomes that the detector got
 
     def probabilities(self, step: Step, target: Array, goal: int) -> tuple[float, float] | None:
-        """Return the probabilities of a step's outcome for `Detector.add`, according to what was learned and without knowledge.
+        """Return the two arguments of `Detector.add` for a step (a transition or a reach), `learned` and `unknown`.
 
-        Call it before the step is learned. For a reach they are densities of its reward. None if a transition ended in contact with the
-        target, because the target may then have caused its outcome. `target`: (3,) m. `goal`: the goal state of a transition.
+        For a transition they are the probabilities of what happened: that it ended in its goal, or that it did not. For a reach they are
+        densities of its reward. Call this before the learner learns from the step. None if a transition ended in contact with the target,
+        because the target may then have caused its outcome. `target`: (3,) m. `goal`: the goal state of a transition.
         """
         if step.a == REACH:
             variance = self._variance(step.s, target)
@@ -169,9 +172,9 @@ class WorldChanges:
         return max(success if step.s_next == goal else 1.0 - success, LEAST), UNKNOWN[0]
 
     def observe(self, step: Step, target: Array, probabilities: tuple[float, float]) -> bool:
-        """Process a step after it was learned; return whether a change of the world was detected.
+        """Process a step after the learner has learned from it; return whether a change of the world was detected.
 
-        `target`: (3,) m. `probabilities`: what the method `probabilities` returned before the step was learned.
+        `target`: (3,) m. `probabilities`: the result of `WorldChanges.probabilities` for this step, before the learner learned from it.
         """
         self._is_reach.append(step.a == REACH)
         if step.a == REACH:
@@ -184,15 +187,16 @@ class WorldChanges:
         return True
 
     def report(self) -> None:
-        """Record a change of the world that is known without detection: only transitions from now on count as made since the change.
+        """Record that the world changes now; for a change that is known without the detector.
 
-        The detector starts anew, because the outcomes before the change are no evidence about changes after it.
+        Transitions before this call are no longer evidence of what the world blocks for all targets. The detector starts anew, because
+        the outcomes before the change are no evidence about changes after it.
         """
         self._failures.change(0)
         self.restart()
 
     def restart(self) -> None:
-        """Make a new detector; what was learned since the last change stays."""
+        """Replace the detector by a new one that knows no outcomes. The memory of failures does not change."""
         self._detector = self._make_detector()
 
     def _variance(self, state: int, target: Array) -> float | None:

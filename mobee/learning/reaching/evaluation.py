@@ -37,11 +37,11 @@ NO_STATE = -1  # instead of a state, where no reach was made
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evaluation:
-    """The results of an evaluation: arrays (R, P) for R repetitions of P problems.
+    """The results of an evaluation: arrays (R, P) for R repetitions of P problems (targets to reach).
 
     `rewards`: reward of the reach; 0 if no reach was made. `states`: state from which the reach started; -1 without a reach. `missing`: m,
-    remaining distance after the reach; NaN without a reach. `failures`: number of failed transitions. `actions`: number of actions, the
-    reach included. `duration`: s, by the plant's clock.
+    remaining distance after the reach; NaN without a reach. `failures`: number of failed transitions. `actions`: number of transitions,
+    plus 1 if a reach was made. `duration`: s, by the plant's clock.
     """
 
     rewards: Array
@@ -59,9 +59,10 @@ class Evaluation:
 
 
 def evaluate(agent: ReachAgent, problems: Sequence[ReachTarget], repetitions: int) -> Evaluation:
-    """Let an agent try every problem once in each repetition, in random order, starting from a random state; return the results.
+    """Let an agent attempt to reach every target (problem) once in each repetition, in random order; return the results.
 
-    The agent does not learn from this. Failed transitions are remembered only until the end of a repetition.
+    A repetition starts from a random state; each further attempt starts where the previous one ended. The agent does not learn from this:
+    transitions are recorded in a copy of its memory of failures, which is discarded at the end of the repetition.
     """
     shape = repetitions, len(problems)
     found = Evaluation(

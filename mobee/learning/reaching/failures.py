@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Memories of failed transitions, which give negative rewards: for all targets, near ones, or similar transitions (thesis 8.1)."""
+"""Memories of failed transitions; they give negative rewards to transitions that are expected to fail (thesis 8.1).
+
+A failure is evidence about the same transition with all targets or only with near targets, or about similar transitions too.
+"""
 
 from __future__ import annotations
 
@@ -25,10 +28,11 @@ MAX_CACHED = 256  # targets whose sums are in memory
 
 
 def midpoints(space: Space, reaches: Reaches) -> Array:
-    """Return the midpoint of each transition: the mean of its start and goal, shape (S A, 3 + d), in row state * A + action.
+    """Return the midpoint of each transition, halfway between its start and its goal, shape (S A, 3 + d).
 
-    The first 3 columns are the marker's position in units of LENGTH_SCALE (0.08 m). The last d are the joints, in units of JOINT_SCALE
-    (0.4) times the spread of their samples (largest minus smallest). For an action that does not exist the goal is the start.
+    Row state * A + action belongs to this action of this state. Columns 0 to 2 are the marker's position in units of LENGTH_SCALE (0.08 m).
+    The last d columns are the positions of the joints; the unit of a joint is JOINT_SCALE (0.4) times the spread of its samples (largest
+    minus smallest). For an action that does not exist the goal is the start.
     """
     goals = np.where(space.goals == NO_ACTION, np.arange(len(space))[:, None], space.goals)
     scaled = reaches.samples / np.maximum(np.ptp(reaches.samples, axis=0), 1e-9) / JOINT_SCALE
@@ -38,12 +42,13 @@ def midpoints(space: Space, reaches: Reaches) -> Array:
 
 
 class AlikeFailures:
-    """A memory of failed transitions: a reward depends on failures with the same target, and of similar transitions with other targets.
+    """A memory of failed transitions that also learns about a transition from the failures of similar transitions.
 
-    A transition that was tried with this target has the average of its rewards and of one imagined reward of 0. Any other transition has a
-    negative reward if similar transitions failed more often than all transitions on average. Two transitions are similar if their joints,
-    and their vectors from hand to target, are similar. This reward is at least -MAX_COST (-0.4): large enough that plans avoid the
-    transition if another path costs little, and too small to exclude a state that was never tried.
+    If a transition was tried with the given target, its reward is the average of its rewards with this target and of one imagined reward
+    of 0. Any other transition has a negative reward if similar transitions failed more often than all transitions on average. Two
+    transitions are similar if their joint positions, and their vectors from hand to target, are similar. The negative reward is at least
+    -MAX_COST (-0.4): large enough that plans avoid the transition if another path costs little, and too small to exclude a state that was
+    never tried.
 
     Args:
         space: states and transitions.
@@ -121,13 +126,16 @@ NEAR_DISTANCE = 0.025  # m, between targets of the published size that block nea
 
 
 class Failures:
-    """A memory of failed transitions: the reward of a transition is an average of 0 for each success and a penalty for each failure.
+    """A memory of failed transitions; the reward of a transition is a weighted average of its recorded rewards.
+
+    A recorded reward is 0 for a success, and negative for a failure. Its weight decreases with the distance between its target and the
+    given target. The average includes one imagined reward of 0.
 
     Args:
         states, actions: number of states, and largest number of actions of a state.
         scale: unit of distances between targets, m.
-        kind: "spread": every failure counts for all targets, less for distant ones (thesis eq. 8.1, with 1 added to its denominator,
-            because otherwise one failure would exclude a transition for all targets); "local": it counts only for targets within 25 mm.
+        kind: "spread": rewards that were recorded with any target are included (thesis eq. 8.1, with 1 added to its denominator, because
+            otherwise one failure would exclude a transition for all targets); "local": only those with a target at most 25 mm away.
     """
 
     def __init__(self, states: int, actions: int, scale: float, kind: Literal["spread", "local"] = "spread") -> None:
@@ -163,11 +171,12 @@ def has_failed(values: Array, state: int, following: int) -> bool:
 class FailuresSinceChange:
     """A memory of failures that also learns which transitions are blocked for all targets since a change of the world.
 
-    Before the first change it returns the rewards of the memory `usual`. A failure in contact with the target is always attributed to the
-    target. Any other failure since the last change counts for all targets: the reward of its transition is the average of its rewards and
-    of one imagined reward of 0. Transitions that were not tried since the change have a reward from the failures of similar transitions, as
-    in `AlikeFailures`; similar means similar joints and position of the hand in the root frame. The lower one of this reward and that of
-    `usual` counts.
+    Before the first change, the reward of a transition is that of the memory `usual`. After a change, it is the lower of two rewards: that
+    of `usual`, and a second one, which is the same for all targets. The second reward depends only on transitions since the last change.
+    Those that ended in contact with the target are left out, because the target may have blocked them. For a transition that was tried
+    since the change, the second reward is the average of its rewards and of one imagined reward of 0. For any other transition it comes
+    from the failures of similar transitions, as in `AlikeFailures`; similar means similar joint positions and a similar position of the
+    hand in the root frame.
 
     Args:
         space: states and transitions.
@@ -193,7 +202,10 @@ class FailuresSinceChange:
                 self._learn(*self._since[-1])
 
     def change(self, transitions: int) -> None:
-        """Record that the world changed before the last `transitions` transitions; transitions that touched the target are not counted."""
+        """Record that the world changed before the last `transitions` transitions.
+
+        This number does not include transitions that ended in contact with the target.
+        """
         self._since = self._since[max(0, len(self._since) - transitions) :]
         self._changed = True
         self._clear()
@@ -255,9 +267,10 @@ def by_target(touched: tuple[str, ...]) -> bool:
 
 
 def failures_of(space: Space, reaches: Reaches, kind: str) -> Failures | AlikeFailures:
-    """Make an empty memory of failures: for the kind "spread" or "local" a `Failures`, for "alike" an `AlikeFailures`.
+    """Make an empty memory of failures of a kind.
 
-    Raises UnknownName if there is no such kind.
+    `kind`: "spread" or "local": a `Failures`, which learns about a transition from its tries with all targets, or with near targets;
+    "alike": an `AlikeFailures`, which learns from similar transitions too. Raises UnknownName if there is no such kind.
     """
     if kind not in FAILURES:
         raise UnknownName("kind of failures", kind, FAILURES)

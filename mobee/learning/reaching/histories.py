@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Histories of values by action and target, and their averages weighted by distance (thesis eqs. 8.1, 8.5, 8.7)."""
+"""Stores observed values, such as rewards, by action and target, and averages the values of each action (thesis eqs. 8.1, 8.5, 8.7).
+
+In an average, values that were observed with distant targets have small weights.
+"""
 
 from __future__ import annotations
 

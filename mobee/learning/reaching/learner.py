@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The reach learner: predictor, failures, plans and choices; it does not act (thesis 8.1 to 8.3)."""
+"""The reach learner: it predicts rewards, remembers failures, plans, and chooses actions, but moves no robot (thesis 8.1 to 8.3)."""
 
 from __future__ import annotations
 
@@ -36,11 +36,12 @@ class ReachSettings(Settings):
         strategy: computes the rewards of reaches in the agent's plans while it learns: a name in `strategies.STRATEGIES` ("intrinsic",
             "greedy" and "random" are those of the thesis), a class or function that makes a strategy, see `strategies.StrategyOf`, or the
             text `module:name` of such a function.
-        failures: the targets for which a failed transition counts: "spread": all targets, as published; "local": targets within 25 mm;
-            "alike": all targets, as evidence about similar transitions.
-        detector: detects changes of the world, after which failed transitions count for all targets, see `FailuresSinceChange`: a name in
-            `changes.DETECTORS`, a class or function that makes a detector, see `changes.DetectorOf`, or the text `module:name` of such a
-            function.
+        failures: the targets for which plans avoid a transition after it has failed: "spread": all targets, but less for distant ones, as
+            published; "local": targets within 25 mm; "alike": its own target; and for all other targets, plans avoid it and similar ones,
+            if these failed more often than the average of all transitions.
+        detector: detects changes of the world. After a change, failed transitions are avoided for all targets, see `FailuresSinceChange`. A
+            name in `changes.DETECTORS`, a class or function that makes a detector, see `changes.DetectorOf`, or the text `module:name` of
+            such a function.
         discount: factor of future rewards in plans.
         scale: unit of the distances in thesis eqs. 8.1, 8.4, 8.5 and 8.7, m.
         penalty: reward of a failed transition, below 0.
@@ -69,8 +70,8 @@ class ReachLearner:
         space: states and transitions of the part.
         reaches: the marker's position in each state, and the unit of distances.
         settings: settings of the learner.
-        beliefs: outcomes of transitions, with which plans are made; None: `debiased()` of `model`, or of an untrained model if `model` is
-            None.
+        beliefs: outcome probabilities of the transitions, from which plans are computed; None: those of `model`, from its method
+            `debiased`. If `model` is None too: every action most probably ends in its goal.
         model: transition model that is learned at the same time; None: none.
 
     Raises:
@@ -119,7 +120,7 @@ class ReachLearner:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The settings of the learner, without its space and its beliefs, as JSON values."""
+        """The settings of the learner as JSON values, without its space and the outcome probabilities from which it plans."""
         return {
             "predictor": self.predictor.settings,
             "strategy": self._strategy_name,
@@ -133,13 +134,13 @@ class ReachLearner:
 
     @property
     def under_way(self) -> int | None:
-        """The number of the problem that is being tried; None if no problem-try is under way."""
+        """The index in `problems.targets` of the target that the agent tries to reach now; None if there is no such attempt."""
         return self._problem
 
     def begin(self, target: ReachTarget) -> None:
-        """Start a problem-try for a target, or continue the present one if its target is at the same position.
+        """Start a problem-try (attempt to reach one target), or continue the present one if its target is at the same position.
 
-        A problem-try with a target at another position ends.
+        If the present problem-try has a target at another position, it is ended first.
         """
         problem = self.problems.index(target)
         if problem != self._problem:
@@ -149,7 +150,7 @@ class ReachLearner:
     def planned(self) -> tuple[Array, Array]:
         """Return the values of states V (S,) and of actions Q (S, A + 1) in the plan of the present problem-try.
 
-        The last column of Q is the reach. Raises InvalidValue if no problem-try is under way.
+        A problem-try is one attempt to reach one target. The last column of Q is the reach. Raises InvalidValue without a problem-try.
         """
         if self._plan is None:
             if self._worth is None:
@@ -160,21 +161,30 @@ class ReachLearner:
     def decide(self, state: int) -> int:
         """Choose the action to take in a state: the number of a transition, or REACH (-1) to reach for the target.
 
-        Raises InvalidValue if no problem-try is under way.
+        Raises InvalidValue if no problem-try (attempt to reach one target) is under way.
         """
         chosen = choose(self.planned()[1][state], self._draws.at(self.seed, self.steps))
         return REACH if chosen == self.space.goals.shape[1] else chosen
 
     def failed(self, state: int, following: int) -> bool:
-        """Return whether a transition failed: `following` has no higher value than `state` in the plan of the present problem-try."""
+        """Return whether a transition failed: the state `following`, in which it ended, has no higher value than its start `state`.
+
+        The values are those of the plan of the present problem-try (attempt to reach one target).
+        """
         return has_failed(self.planned()[0], state, following)
 
     def expected(self, state: int) -> float:
-        """Return the reward that the predictor expects of a reach from a state for the target of the present problem-try."""
+        """Return the expected reward of a reach from a state for the target that the agent tries to reach now.
+
+        Raises InvalidValue if no problem-try (attempt to reach one target) is under way.
+        """
         return float(self.predictor.mean(self._target)[state])
 
     def observe(self, step: Step) -> None:
-        """Learn from a step of the present problem-try; a reach ends it, and so does the last step that `limit` allows."""
+        """Learn from a step of the present problem-try (attempt to reach one target).
+
+        The problem-try ends with this step if the step is a reach, or if the problem-try has `limit` steps now.
+        """
         self._made.append(step)
         self.steps = step.n
         expected = None if self.changes is None else self.changes.probabilities(step, self._target, self._goal(step))
@@ -191,8 +201,8 @@ class ReachLearner:
     def replay(self, targets: list[ReachTarget], steps: list[Step]) -> None:
         """Learn from recorded steps, in their order.
 
-        `targets`: the targets of all problems, in the order of the problems' numbers. `steps`: all recorded steps. If the last problem-try
-        (attempt to reach a target) has not ended, its plans are computed too, because the learner continues with them.
+        `targets`: the targets of all problems, in the order of the problems' numbers. `steps`: all recorded steps. The learner can
+        continue the last problem-try (attempt to reach a target) if it has not ended; so the plans of this one are computed too.
         """
         for target in targets:
             self.problems.index(target)
@@ -209,7 +219,8 @@ class ReachLearner:
     def problem_draws(self) -> np.random.Generator:
         """Return the random generator for the choice of the target of the next problem-try (one attempt to reach a target).
 
-        Its numbers depend only on the part, the seed and the number of problem-tries that have ended. It is valid until the next call.
+        Its numbers depend only on the learner's part and seed, and on the number of problem-tries that have ended. Use it only until the
+        next call of this method, which returns the same object in another state.
         """
         return self._draws_of_problem.at(self.seed, self.tries)
 
@@ -234,7 +245,10 @@ class ReachLearner:
             self._plan = None
 
     def end_try(self) -> None:
-        """End the problem-try under way, if there is one; it counts as a try if it has a step."""
+        """End the present problem-try (attempt to reach one target), if there is one.
+
+        It is included in `tries`, and stored in `last`, only if at least one action was made in it.
+        """
         if self._problem is not None and self._made:
             self.problems.tries[self._problem] += 1
             self.tries += 1

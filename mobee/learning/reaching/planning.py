@@ -16,13 +16,14 @@ TOLERANCE = 1e-6  # of values; the largest are about 1
 
 
 class ReachPlanning:
-    """Computes the values of states and actions for plans in which every state has one more action, the reach, which ends the plan.
+    """Computes the values of states and actions for plans that end in a reach.
 
-    It is an `OutcomeModel` with one more state, the end of the plan, and one more action, the reach.
+    For this, the object is an `OutcomeModel` of the space with two additions: each of the S states has one more action, the reach, after
+    the A transitions; the reach always leads to one more state, the end of the plan.
 
     Args:
         space: states and transitions.
-        beliefs: outcomes of the transitions.
+        beliefs: outcome probabilities of the transitions.
         discount: factor per step, in [0, 1).
     """
 
@@ -34,19 +35,19 @@ class ReachPlanning:
 
     @property
     def outcomes(self) -> Ints:
-        """The states in which each action may end, shape (S + 1, A + 1, B).
+        """The states in which each action may end, shape (S + 1, A + 1, B); B: largest number of outcomes of an action.
 
-        The last state is the end of the plan, the last action the reach.
+        The state with index S is the end of the plan, the action with index A is the reach.
         """
         return self._outcomes
 
     @property
     def probabilities(self) -> Array:
-        """The probabilities of the outcomes of each action, shape (S + 1, A + 1, B); all 0 in the last state, the end of the plan."""
+        """The probabilities of `outcomes`, shape (S + 1, A + 1, B); all 0 in the state with index S, which is the end of the plan."""
         return self._probabilities
 
     def refresh(self) -> None:
-        """Copy the outcomes and probabilities of the beliefs again, after these have changed."""
+        """Copy outcomes and probabilities again from the model `beliefs` (see the constructor), after that model has changed."""
         states, actions = self._states, self._actions
         bins = self._beliefs.probabilities.shape[2]
         self._outcomes: Ints = np.full((states + 1, actions + 1, bins), states, dtype=np.int64)
@@ -89,9 +90,8 @@ class ReachPlan:
 def plan_reach(space: Space, planning: ReachPlanning, expected: Array, failures: Array, start: int) -> ReachPlan:
     """Compute the path from the state `start`, and the reach at its end, that have the highest value.
 
-    `expected`: (S,) expected rewards of the reaches; give 0 in place of a negative one, because the best plan makes no reach of negative
-    reward. `failures`: (S, A) rewards of the transitions, below 0 for those that have failed. Raises InvalidValue if the space has no such
-    state.
+    `expected`: (S,) expected rewards of the reaches; replace negative values by 0. `failures`: (S, A) rewards of the transitions, below 0
+    for those that have failed. Raises InvalidValue if the space has no state `start`.
     """
     space.actions(start)
     path, actions, probabilities = _best_path(planning, start, *planning.values(expected, failures))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The reach agent: learns from which state a target is best reached, and a path to this state (thesis chapter 8)."""
+"""The reach agent. For each target it learns the best state from which to reach, and a path to this state (thesis chapter 8)."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ class ReachAgent(ReachLearner):
     Args:
         space: states and transitions of the part.
         plant: the robot on which the agent acts; it must have the motors of the space's robot.
-        beliefs: outcomes of transitions, with which plans are made, e.g. `load_learned(file).model.debiased()`. None: the outcomes of
-            `model`; without a model: every action mostly reaches its goal.
+        beliefs: outcome probabilities of the transitions, from which plans are computed, e.g. `load_learned(file).model.debiased()`. None:
+            those of `model`; if `model` is None too: every action most probably ends in its goal.
         marker: the marker that must reach the targets.
         settings: settings of the agent; None: the defaults.
         store: file to which steps are written, and from which they are read at the start; None: they are not stored.
@@ -47,7 +47,7 @@ class ReachAgent(ReachLearner):
         **changes: fields of `ReachSettings` by keyword, in place of the values in `settings`.
 
     Raises:
-        UnknownName: no such setting, predictor, strategy, kind of failures, detector, or marker.
+        UnknownName: no such setting, predictor, strategy, value of the setting `failures`, detector, or marker.
         InvalidValue: a plant of another robot, or a value out of range.
         MobeeError: the store holds reaches of another space, marker or scale.
     """
@@ -83,7 +83,7 @@ class ReachAgent(ReachLearner):
     def state(self) -> int:
         """The present state of the part, from the last outcome.
 
-        At the start, and after an interruption or an evaluation, reading it measures the state.
+        At the start, and after an interruption or an evaluation, the state is not known: then the plant measures it when it is read.
         """
         if self._state is None:
             self._state = self.space.state_of(self.plant.measure(self.part))
@@ -103,9 +103,10 @@ class ReachAgent(ReachLearner):
         return self.last
 
     def learn(self, problems: Sequence[ReachTarget], tries: int) -> None:
-        """Make `tries` more problem-tries, each for the problem with the fewest tries (thesis 8.3.2).
+        """Make `tries` more attempts to reach a target (problem-tries), each for the problem with the fewest tries (thesis 8.3.2).
 
-        If several problems have the fewest tries, a random one of them is chosen. After an interrupted action the agent decides again.
+        A problem is one target. If several problems have the fewest tries, a random one of them is chosen. A problem-try under way is
+        continued first. If an action is interrupted, the agent chooses the next action of the same problem-try.
         """
         end = self.tries + tries
         while self.tries < end:
@@ -118,9 +119,10 @@ class ReachAgent(ReachLearner):
     def practise(self, plant: ReachPlant, problems: Sequence[ReachTarget], tries: int) -> None:
         """Learn from problem-tries on another plant, for example a simulated robot in the world as it is perceived now.
 
-        It saves tries on the robot after a change of the world that is perceived, such as an object that was not there before. With a
-        detector the world counts as changed before the first of these tries. A problem-try under way ends; `tries` and `steps` count the
-        tries and actions on both plants. `plant`: moves the space's robot. `problems`, `tries`: as in `learn`.
+        A problem-try is one attempt to reach one target. After the robot has perceived a change of the world, such as a new object,
+        practice reduces the number of tries on the robot. If the agent has a detector of changes, it assumes that the world changed just
+        before the first of these tries. A problem-try under way is ended first. The attributes `tries` and `steps` include the tries and
+        actions on both plants. `plant`: moves the space's robot. `problems`, `tries`: as in `learn`.
 
         Raises InvalidValue for a plant of another robot, or if the agent has a store, which holds what happened to one robot only.
         """
@@ -156,9 +158,10 @@ class ReachAgent(ReachLearner):
             self._state = None
 
     def step(self) -> Step:
-        """Perform one action of the present problem-try, learn from it, and return it; raises ActionInterrupted if the plant does.
+        """Perform one action of the present problem-try (attempt to reach one target), learn from it, and return it.
 
-        The plant must present the target, see `try_problem`.
+        Before, `begin` must start the problem-try, and the plant's method `present` must be called with its target, as `try_problem` does.
+        Raises ActionInterrupted if the plant interrupts the action, and InvalidValue if no problem-try is under way.
         """
         state = self.state
         action = self.decide(state)

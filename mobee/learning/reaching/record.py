@@ -26,7 +26,8 @@ def load_reaches(
 ) -> ReachAgent:
     """Rebuild a reach agent from the file of a run, to use what it learned: its strategy is "greedy", and it stores nothing.
 
-    It plans with the outcomes of the part's transitions in the same file; without such transitions, every action mostly reaches its goal.
+    It plans with the outcomes of the part's transitions in the same file. If the file has none for this space, the agent assumes at first
+    that every action most probably ends in its goal.
 
     Args:
         file: the file of the run.

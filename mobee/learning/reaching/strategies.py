@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Strategies, which compute the rewards of reaches for plans: random, greedy, intrinsic, bounds, samples, progress (thesis 8.3.2)."""
+"""Strategies of a reach learner: each computes the rewards of the reach actions that its plans use while it learns (thesis 8.3.2).
+
+They are: random, greedy, intrinsic (prediction errors), upper bounds, random samples (Thompson sampling) and learning progress.
+"""
 
 from __future__ import annotations
 
@@ -39,9 +42,10 @@ class Progress:
             self._interest[state] = abs(rewards[-half:].mean() - rewards[:half].mean())
 
     def rewards(self, target: Array, rng: np.random.Generator) -> Array:
-        """Return for each state how much its rewards have changed recently, (S,).
+        """Return for each state the change of its last eight rewards: the absolute difference between the means of their halves, (S,).
 
-        With a probability of 0.2, return 1 for a random state and 0 for all others instead. `target` is not used.
+        For a state with fewer than two rewards it is 1. But with a probability of 0.2, the method returns 1 for a random state and 0 for
+        all others. `target` is not used.
         """
         if rng.random() >= RANDOM_SHARE:
             return self._interest.copy()
@@ -54,9 +58,10 @@ OPTIMISM = 2.0  # standard deviations that `ucb` adds to the expected reward
 
 
 class Strategy(Protocol):
-    """Computes the rewards that the reach actions have in a learner's plans while it learns, in place of the observed rewards.
+    """The interface of strategies: computes the rewards that the reach actions have in a learner's plans while it learns.
 
-    These rewards must depend only on the reaches that were added and on the random generator; the method `rewards` must change nothing.
+    These rewards decide what the learner tries; they need not be the rewards that it will observe. They must depend only on the reaches
+    that were added and on the random generator; the method `rewards` must change nothing.
     """
 
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:
@@ -69,7 +74,7 @@ class Strategy(Protocol):
     def rewards(self, target: Array, rng: np.random.Generator) -> Array:
         """Return the reward of a reach from each state for a target (3,) m, shape (S,).
 
-        `rng`: random generator; within one problem-try (attempt to reach one target) it always starts in the same state.
+        `rng`: random generator; it gives the same random numbers in each call within one problem-try (attempt to reach one target).
         """
         ...
 
@@ -94,7 +99,10 @@ class Random:
 
 
 class Greedy:
-    """A strategy: the reward of a reach is the reward that the predictor expects, which may be optimistic (thesis eq. 8.5)."""
+    """A strategy: the reward of a reach is the reward that the predictor expects (thesis eq. 8.5).
+
+    The expected reward may be too high where little was tried: the predictor `Weighted` expects 1 for a state that was never tried.
+    """
 
     def __init__(self, reaches: Reaches, predictor: RewardPredictor) -> None:
         self._predictor = predictor
@@ -108,7 +116,11 @@ class Greedy:
 
 
 class Intrinsic:
-    """A strategy: the reward of a reach is the expected prediction error: the average of earlier errors (thesis eqs. 8.6 and 8.7)."""
+    """A strategy: the reward of a reach is the prediction error to expect (thesis eqs. 8.6 and 8.7).
+
+    An error is the expected minus the observed reward. The error to expect is the average of earlier errors in reaches from the same state,
+    with more weight for nearer targets, and of one imagined error of 1.
+    """
 
     def __init__(self, reaches: Reaches, predictor: RewardPredictor) -> None:
         self._errors = Histories(len(reaches), reaches.scale)
@@ -118,7 +130,10 @@ class Intrinsic:
         self._errors.add(state, target, expected - reward)
 
     def rewards(self, target: Array, rng: np.random.Generator) -> Array:
-        """Return the expected prediction error of a reach from each state for a target (3,) m, shape (S,); 1 for a state never tried."""
+        """Return the expected error (predicted minus observed reward) of a reach from each state for a target (3,) m, shape (S,).
+
+        It is 1 for a state that was never tried.
+        """
         return self._errors.average(target, 1.0)
 
 
@@ -129,7 +144,7 @@ class UpperBound(Greedy):
     """
 
     def rewards(self, target: Array, rng: np.random.Generator) -> Array:
-        """Return expected reward plus two standard deviations of a reach from each state for a target (3,) m, shape (S,)."""
+        """Return for a reach from each state the expected reward plus two times its standard deviation, shape (S,); `target`: (3,) m."""
         return self._predictor.mean(target) + OPTIMISM * self._predictor.deviation(target)
 
 

@@ -21,7 +21,7 @@ World = Callable[[Array], tuple[Array, Array]]
 
 
 class ReachTable(TabularPlant):
-    """A `TabularPlant` on which a part can also reach, and where the presented target may block transitions.
+    """A `TabularPlant` that can also reach for a target. The target given to `present` may block transitions.
 
     The random outcome of the n-th action depends only on the seed and n.
 
@@ -69,10 +69,10 @@ class ReachTable(TabularPlant):
         self._presented = self._seen[key]
 
     def act(self, part: str, target: Array) -> Outcome:
-        """Perform the action of the present state that aims at `target` (n_part,) rad; an action counts as 1 s.
+        """Perform the action of the present state whose goal has the pose `target`, (n_part,) rad; the outcome's duration is 1 s.
 
-        If the presented target blocks the action, it ends in its start state and touches the target. Raises InvalidValue if the state has
-        no such action. `part`: must be the part of the space.
+        If the reach target (given to `present`) blocks the action, the part stays in its state and touches the reach target. Raises
+        InvalidValue if the state has no such action. `part`: must be the part of the space.
         """
         if self._presented is not None:
             action = self._action[self.state].get(self.space.state_of(target))
@@ -84,10 +84,10 @@ class ReachTable(TabularPlant):
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
         """Reach for the target that was given to `present`, from the present state; the part stays in this state.
 
-        The remaining distance in the outcome is the mean distance that the function `world` gives for target and state, plus noise. The
-        position of the marker in the outcome is always (0, 0, 0). A reach counts as 2 s. `part`: the part of the space. `marker`: name of
-        the marker, only for the error message. `stay`: not used. Raises InvalidValue if no target is presented, and UnknownName for another
-        part.
+        The remaining distance in the outcome is the mean distance that the function `world` gives for target and state, plus noise (the
+        absolute value of this sum). The position of the marker in the outcome is always (0, 0, 0), and its duration 2 s. `part`: the part
+        of the space. `marker`: name of the marker, only for the error message. `stay`: not used. Raises InvalidValue if no target is
+        presented, and UnknownName for another part.
         """
         if self._presented is None:
             raise InvalidValue(f"nothing to reach for with the {marker}: present a target first.")

@@ -87,11 +87,11 @@ class Step:
 class Try:
     """A problem-try (attempt to reach one target) that has ended.
 
-    `number`: its number, 1, 2, ... `problem`: number of its target. `path`: its transitions, each as (state, action, next state, failed).
-    `reach_state`: the state where the reach started; None: the try ended at the limit of actions without a reach. `reward`, `expected`:
-    observed and predicted reward of the reach. `intrinsic`: expected minus observed reward (thesis eq. 8.6). `missing`: m, remaining
-    distance after the reach. `reward`, `expected`, `intrinsic` and `missing` are 0 without a reach. `timeouts`: number of actions that
-    timed out. `duration`: s, by the plant's clock.
+    `number`: its number, 1, 2, ... `problem`: number of its target, 0, 1, ... `path`: its transitions, each as (state, action, next state,
+    failed). `reach_state`: the state where the reach started; None: the try ended at the limit of actions without a reach. `reward`,
+    `expected`: observed and predicted reward of the reach. `intrinsic`: expected minus observed reward (thesis eq. 8.6). `missing`: m,
+    remaining distance after the reach. `reward`, `expected`, `intrinsic` and `missing` are 0 without a reach. `timeouts`: number of actions
+    that timed out. `duration`: s, by the plant's clock.
     """
 
     number: int

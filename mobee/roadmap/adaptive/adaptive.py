@@ -23,9 +23,9 @@ class AdaptiveRoadmap:
 
     It is a simple Markov decision process: states are vertices, actions are edges, and an action ends at the goal of its edge or at the
     vertex where it began. `space` is the graph (`mobee.learning.space.Space`, S vertices with at most A edges each); `beliefs` are the
-    success probabilities of the edges (`EdgeBeliefs`). `mobee.Planner` and `mobee.value_iteration` can plan on these two as on those of a
-    curious agent. `plan` finds the same paths faster: an edge of length d that succeeds with probability p costs d / p, since it needs 1 /
-    p tries on average.
+    success probabilities of the edges (`EdgeBeliefs`). `mobee.Planner(space, beliefs, ...)` and `mobee.value_iteration(beliefs, ...)` plan
+    with them, as with the space and the learned model of a curious agent. `plan` finds the same paths as value iteration, but faster: an
+    edge of length d that succeeds with probability p costs d / p, since it needs 1 / p tries on average.
 
     Args:
         space: vertices and edges over joints of one part, e.g. `mobee.Voronoi(robot, joints, 20, neighbours=10)` or
@@ -75,7 +75,7 @@ class AdaptiveRoadmap:
 
     @property
     def stuck(self) -> Ints:
-        """Numbers of the vertices from which every edge was tried and failed at its last try (thesis 4.3.1)."""
+        """Indices of the vertices from which every edge was tried and failed at its last try (thesis 4.3.1)."""
         return np.flatnonzero(~self.beliefs.last.any(axis=1))
 
     @property
@@ -170,9 +170,10 @@ class AdaptiveRoadmap:
         return int(found[0]) if len(found) else None
 
     def grow(self, samples: ArrayLike, neighbours: int = NEIGHBOURS) -> Ints:
-        """Add `samples`, poses of the d joints (N, d) rad, as vertices; return the numbers of the new vertices, (N,).
+        """Add `samples`, poses of the d joints (N, d) rad, as vertices; return the indices of the new vertices, (N,).
 
-        Each new vertex gets edges to and from its `neighbours` nearest vertices; distances are measured in ranges of the joints.
+        Each new vertex gets edges to and from its `neighbours` nearest vertices. For this distance, each joint's difference is divided by
+        the joint's range.
         """
         new = self._new(samples)
         poses, old = np.concatenate([self.space.samples, new]), len(self)
@@ -189,8 +190,8 @@ class AdaptiveRoadmap:
     def join(self, state: int, samples: ArrayLike, goal: int) -> Ints:
         """Add a path in both directions between the vertices `state` and `goal`, through `samples`, K >= 1 new poses (K, d) rad.
 
-        Returns the numbers of the new vertices, (K,). A path that a single-query planner has found can thus repair a vertex without usable
-        edges.
+        Returns the indices of the new vertices, (K,). The method is meant for a vertex without usable edges, from which a single-query
+        planner has found a path.
         """
         first, last = (int(target_states(self.space, vertex)[0]) for vertex in (state, goal))
         new, old = self._new(samples), len(self)

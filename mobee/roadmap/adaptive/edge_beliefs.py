@@ -100,8 +100,8 @@ def roadmap_space(roadmap: Roadmap, joints: Sequence[str] | None = None) -> Spac
     """Return a space whose states are a roadmap's poses and whose actions are its edges, in both directions.
 
     States are the vertices of the map's largest connected component, in their order; all other vertices are left out. Vertices that have
-    the same positions of `joints` become one state. The part's motors that are not in `joints` stay at their position in the
-    component's first vertex.
+    the same positions of `joints` become one state. The part's motors that are not in `joints` do not move: they keep the
+    positions that they have in the first vertex of this component.
 
     Args:
         roadmap: e.g. of `mobee.build_roadmap`.

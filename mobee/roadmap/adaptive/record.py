@@ -36,7 +36,7 @@ class Change:
 
 
 class MapStore(TransitionStore):
-    """A TransitionStore of observed tries of edges (transitions) that also records the changes of the adaptive roadmap between them.
+    """Stores the observed tries of edges of an adaptive roadmap as transitions, and the changes of the roadmap between these tries.
 
     Args:
         path: the SQLite file of the run; it is created if it does not exist.

@@ -37,15 +37,15 @@ class Walker:
     """Moves one part of a robot along the edges of an adaptive roadmap.
 
     To move along an edge, the walker commands the part to the pose of the edge's goal. The edge succeeds if the part comes to rest within
-    `near` of the goal. Otherwise the map records the failure, the part moves back to the start of the edge (thesis 4.1: the reflex), and
-    the walker plans a new path.
+    `near` of the goal. Otherwise the map records the failure, the part moves back to the start of the edge (in thesis 4.1, the reflex does
+    this), and the walker plans a new path.
 
     Args:
         roadmap: the map, which the walker changes.
         plant: executes the actions; its robot must be that of the map.
         near: largest distance of every joint from a vertex at which the part counts as being there [rad].
-        back: whether the part always moves back after a failure; False: it moves directly to the next vertex of the new path, and back only
-            if it does not arrive there.
+        back: True: the part moves back after each failure.  False: `go` moves it directly to the next vertex of the new path; it moves back
+            only if it does not arrive at this vertex.
         store: receives the observations; if it already has some, the walker continues from them.
 
     Raises:
@@ -71,7 +71,7 @@ class Walker:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The settings that determine the walker's behaviour, with those of the roadmap but without the plant, as plain JSON values."""
+        """The constructor's arguments `near` and `back`, and the settings of the roadmap, as plain JSON values."""
         return {"roadmap": self.roadmap.settings, "near": self.near, "back": self.back}
 
     def go(self, goals: ArrayLike, most: int | None = None) -> Walk:
@@ -93,8 +93,8 @@ class Walker:
     def follow(self, state: int, goal: int) -> bool:
         """Move along the edge from vertex `state` to vertex `goal` and record the outcome; return whether the motion succeeded.
 
-        After a failure the part moves back to `state` if `back` is set. Raises InvalidValue if the roadmap has no such edge, and
-        ActionInterrupted if the plant interrupts an action.
+        After a failure the robot's part moves back to `state` if the constructor's argument `back` is True. Raises InvalidValue if the
+        roadmap has no such edge, and ActionInterrupted if the plant interrupts an action.
         """
         action = self.roadmap.action(state, goal)
         if action is None:

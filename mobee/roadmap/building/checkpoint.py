@@ -28,9 +28,9 @@ _PROBES, _DIGITS = 8, 9  # poses that identify costs and coordinates by their va
 
 
 def request(model: Model, problem: Problem, task: Task, spacing: Array, others: Mapping[str, Any]) -> dict[str, Any]:
-    """Return all settings that determine the roadmap, as plain JSON values; `others`: further settings, which are added by name.
+    """Return all settings that determine the roadmap, as plain JSON values.
 
-    `spacing`: (m,) distance between vertices in each task coordinate.
+    `spacing`: (m,) distance between vertices in each task coordinate. `others`: further settings by name, added to the result unchanged.
     """
     return {
         **digests(model),
@@ -71,8 +71,9 @@ _PREFIX = "front_"  # of the names of arrays that only the building needs
 class Progress:
     """Progress of building a roadmap.
 
-    `vertices`: number of vertices found. `evaluations`: number of poses evaluated. `open`: work that is left: number of vertices from which
-    an evolution-strategy search may still start, or of lattice points that least squares must still try. `seconds`: time spent, in s.
+    `vertices`: number of vertices found. `evaluations`: number of poses evaluated. `open`: amount of work left:
+    during least squares, the number of lattice points still to be tried; during the evolution strategy, the number of vertices from which a
+    search may still start. `seconds`: time spent, in s.
     """
 
     vertices: int
@@ -96,7 +97,10 @@ class Builder(Protocol):
 
     @property
     def open(self) -> int:
-        """Number of vertices from which a search may still start, or of lattice points that are still to be tried."""
+        """Amount of work left, as a number of points or vertices.
+
+        Least squares: lattice points that are still to be tried. Evolution strategy: vertices from which a search may still start.
+        """
 
     def step(self) -> bool:
         """Search for further vertices; return False if there is nothing left to try."""
@@ -111,8 +115,8 @@ class Builder(Protocol):
 class Checkpoint:
     """Runs the builders of a roadmap, saves their state to a file, and reports progress.
 
-    The attribute `stage` is the name of the builder that ran when an existing file was written ("flood": lattice, "front": evolution
-    strategy); None if there is no such file, or if it holds a finished roadmap.
+    The attribute `stage` states which builder wrote the unfinished roadmap in `file`: "flood" (lattice) or "front" (evolution strategy). It
+    is None if there is no such file, or if the file holds a finished roadmap.
 
     Args:
         model: robot and world.
@@ -147,9 +151,9 @@ class Checkpoint:
         return load_roadmap(self._file, self._model)
 
     def run(self, name: str, builder: Builder) -> None:
-        """Run all steps of a builder; `name`: name of this stage of the building.
+        """Run all steps of a builder; `name`: name of the builder's stage, "flood" or "front" (see `stage`).
 
-        If a file of an unfinished roadmap was written in the same stage, the builder continues from the state in that file.
+        If `stage` is equal to `name`, the file holds an earlier state of this builder, and the builder continues from it.
         """
         if self._found is not None and self.stage == name:
             arrays, notes = self._found

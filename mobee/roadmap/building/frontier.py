@@ -73,9 +73,9 @@ _BORDER = 1e-9  # barycentric: points on the border are inside
 class SimplexRegion:
     """The region of a task space that is covered by simplices (R of thesis Algorithm 4).
 
-    All points are task coordinates divided by the spacing of the roadmap, so corners of a simplex are about 1 apart. A simplex is stored as
-    its first corner, the origin, and the inverse of the matrix whose columns are its edges from this corner. `dimensions`: m of the task
-    space.
+    All points are task coordinates divided by the spacing of the roadmap, so corners of a simplex are about 1 apart. The region stores
+    two arrays for each simplex: its first corner (called the origin), and the inverse of the matrix whose columns are the edges from this
+    corner to the others. `dimensions`: m of the task space.
     """
 
     def __init__(self, dimensions: int) -> None:
@@ -86,9 +86,10 @@ class SimplexRegion:
         return len(self._origins)
 
     def add(self, corners: Array) -> Array | None:
-        """Add a simplex by its corners (m + 1, m); return the inverse (m, m) of the matrix whose columns are its edges from the first one.
+        """Add the simplex with the corners `corners` (m + 1, m).
 
-        Returns None, and adds nothing, if the simplex is nearly flat (its determinant, in spacings, is below MIN_DETERMINANT = 0.05).
+        Returns the inverse (m, m) of the matrix whose columns are the edges from the first corner to the others. Returns None, and
+        adds nothing, if the simplex is nearly flat (its determinant, in spacings, is below MIN_DETERMINANT = 0.05).
         """
         edges = (corners[1:] - corners[0]).T
         if abs(np.linalg.det(edges)) < MIN_DETERMINANT:
@@ -199,9 +200,10 @@ class Frontier:
         )
 
     def add(self, point: Array) -> Array | None:
-        """Add a vertex at a point (m,), its edges to the m nearest vertices, and the simplex whose corners are all of these.
+        """Add a vertex at a point (m,), and its edges to the m nearest vertices.
 
-        Returns the inverse (m, m) of the matrix whose columns are the simplex's edges from the new vertex; None if there are fewer than m
+        Also adds the simplex whose m + 1 corners are the new vertex and these m vertices to the region. Returns the inverse (m, m) of the
+        matrix whose columns are the simplex's edges from the new vertex; None if there are fewer than m
         other vertices, or if the simplex is flat.
         """
         number, n = len(self), self.dimensions

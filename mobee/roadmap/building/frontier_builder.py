@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Builds a roadmap by evolution-strategy searches that start at vertices and end beside them (thesis Algorithms 3 and 4)."""
+"""Builds a roadmap: each evolution-strategy search starts at a vertex and finds a new vertex near it (thesis Algorithms 3 and 4)."""
 
 from __future__ import annotations
 
@@ -32,8 +32,9 @@ BATCH = 80  # poses per call of the model; fixed, so that results do not depend 
 class EvaluatedPoses:
     """The evaluation of N poses.
 
-    `cost`: (N,) sum of the costs of all terms (`mobee.costs`) and of the distance outside the task's box. `valid`: (N,) whether all terms
-    are within their tolerances and the pose is inside the box. `point`: (N, m) task coordinates divided by the spacing.
+    `cost`: (N,) sum of the costs of all terms (`mobee.costs`), plus a penalty for a point outside the task's box: the sum of the squared
+    excesses of its coordinates, each in units of 0.25 spacings. `valid`: (N,) whether all terms are within their tolerances and the point
+    is inside the box. `point`: (N, m) task coordinates divided by the spacing.
     """
 
     cost: Array
@@ -116,8 +117,14 @@ LIMIT_COST = 1000.0  # of a sample that was clipped to the limits: times its squ
 class FrontierBuilder:
     """Grows a roadmap by searches with an evolution strategy (thesis Algorithms 3 and 4).
 
-    Each `step` computes one generation of every search and adds the vertices that the searches found. `frontier`: the vertices in the task
-    space, in spacings. `rng`: draws all random numbers. `problem`: the pose search problem, which also counts the evaluated poses.
+    Each `step` computes one generation of every search and adds the vertices that the searches found. The attribute `frontier` holds the
+    points of the vertices in the task space, divided by the spacing. The attribute `problem` is the evaluator's pose search problem; it
+    also counts the evaluated poses.
+
+    Args:
+        evaluator: computes the costs and task coordinates of poses.
+        settings: settings of the searches.
+        rng: draws all random numbers.
     """
 
     def __init__(self, evaluator: PoseEvaluator, settings: SearchSettings, rng: np.random.Generator) -> None:
@@ -182,7 +189,7 @@ class FrontierBuilder:
         return True
 
     def state(self) -> dict[str, NDArray[Any]]:
-        """Return the state as arrays by name, without that of `rng`; "q" and "y" are the poses and task coordinates of the vertices."""
+        """Return the state, except that of `rng`, as arrays by name; "q" and "y" are the poses and task coordinates of the vertices."""
         q, y = self.result()
         known = {"q": q, "y": y, "postures": self._postures.rows, "places": self.frontier.points, "weights": self.frontier.weights}
         return self.scheduler.state() | known | {"best": self._best, "best_cost": np.array(self._best_cost)}

@@ -45,7 +45,7 @@ class Lattice:
     def y(self, points: Ints) -> Array:
         """Return the task coordinates (N, m) of lattice or intermediate points, each in the unit of its coordinate (for example m or rad).
 
-        `points`: (N, m) whole numbers, multiples of half of each basis vector of the lattice, from the middle of the box.
+        `points`: (N, m) whole numbers. The point of a row p is the middle of the box plus the sum of p[i] / 2 times basis vector i.
         """
         found: Array = self._origin + (points @ self._edges) * self._spacing
         return found
@@ -53,30 +53,31 @@ class Lattice:
     def neighbours(self, points: Ints) -> list[list[Point]]:
         """Return for each point a list of the lattice points in the task's box at most one spacing away, without the point itself.
 
-        `points`: (N, m) whole numbers, multiples of half of each basis vector of the lattice, from the middle of the box; a point in the
-        result is a tuple of m such numbers.
+        `points`: (N, m) whole numbers. The point of a row p is the middle of the box plus the sum of p[i] / 2 times basis vector i of the
+        lattice. Each point of the result is a tuple p of the same form.
         """
         return self._shifted(points, self._neighbours, lattice_only=True)
 
     def intermediate(self, points: Ints) -> list[list[Point]]:
         """Return for each lattice point a list of the intermediate points in the task's box that are half a spacing away.
 
-        `points`: (N, m) whole numbers, multiples of half of each basis vector of the lattice, from the middle of the box; a point in the
-        result is a tuple of m such numbers.
+        `points`: (N, m) whole numbers. The point of a row p is the middle of the box plus the sum of p[i] / 2 times basis vector i of the
+        lattice. Each point of the result is a tuple p of the same form.
         """
         return self._shifted(points, self._halves, lattice_only=False)
 
     def too_close(self, point: Point) -> list[Point]:
         """Return the lattice and intermediate points nearer than MIN_DISTANCE (0.8 spacings) to a point, also those outside the box.
 
-        Each point is a tuple of m whole numbers, multiples of half of each basis vector of the lattice, from the middle of the box.
+        Each point is a tuple p of m whole numbers: the middle of the box plus the sum of p[i] / 2 times basis vector i of the lattice.
         """
         return [tuple(a + b for a, b in zip(point, offset, strict=True)) for offset in self._close]
 
     def nearest(self, y: Array) -> Ints:
         """Return for each of N task coordinates y (N, m) a lattice point in the task's box that is approximately the nearest one.
 
-        The result (N, m) has whole numbers, multiples of half of each basis vector of the lattice, from the middle of the box.
+        The result (N, m) has whole numbers. The point of a row p is the middle of the box plus the sum of p[i] / 2 times basis vector i of
+        the lattice; all p[i] are even.
         """
         scaled = np.clip((y - self._origin) / self._spacing, -self._width, self._width)
         edges = 0.5 * scaled @ np.linalg.inv(self._edges)
@@ -122,8 +123,8 @@ class FailedPoint:
     """A lattice point, or a point half-way between lattice points, for which no valid pose was found so far.
 
     `q`: (n,) rad, the best posture found; for an intermediate point that was not tried yet, the posture of the lattice point beside it.
-    `violation`: sum of weight times residual of this posture over the terms beyond their tolerances; infinite if least squares has found no
-    posture at the point. `left`: number of tries left.
+    `violation`: sum of weight * residual over the terms that the posture `q` violates (residual above tolerance); infinite if least squares
+    has found no posture at the point. `left`: number of tries left.
     """
 
     q: Array
@@ -135,9 +136,10 @@ class PointTable:
     """The status of the points of a `Lattice`: which were reached, are to be tried, or have failed.
 
     `vertex`: dict from each point that was reached to the number of its vertex. `q`, `y`: lists of the poses (n,) rad and task coordinates
-    (m,) of the vertices, by number. `untried`: dict whose keys are lattice points next to vertices; the value lists the vertices from whose
-    postures least squares must still try to reach the point. `failed`: dict from each point without a valid pose so far to its
-    `FailedPoint`. `intermediate`: the points half-way between lattice points that were tried or are to be tried.
+    (m,) of the vertices, by number. `untried`: dict from each lattice point that is to be tried to a list of vertices next to it; the
+    postures of these vertices are the start postures for least squares that were not yet tried for this point. `failed`: dict from each
+    point without a valid pose so far to its `FailedPoint`. `intermediate`: the points half-way between lattice points that were tried or
+    are to be tried.
 
     Args:
         motors: number n of motors of the robot.
@@ -160,7 +162,10 @@ class PointTable:
         return self._points(self.vertex), q, y
 
     def state(self) -> dict[str, NDArray[Any]]:
-        """Return the table as arrays by name; "q" and "y" are the poses and task coordinates of the vertices."""
+        """Return the content of this table as a dict of arrays, from which `restore` can fill another table.
+
+        Among them are the poses "q" (V, n) rad and task coordinates "y" (V, m) of the vertices.
+        """
         points, q, y = self.vertices()
         failed = self.failed.values()
         return {
@@ -208,10 +213,10 @@ class Patience:
     """Limits of the work on a lattice point that was not reached from the postures of its neighbours.
 
     `starts`: number of start postures of least squares in each try. `tries`: largest number of tries of a lattice point at which least
-    squares has found a posture that only violates tolerances, for example because it has contacts. `hopeless`: the same for a point at
-    which least squares has found no posture at all. `between`: the same for an intermediate point, half-way between lattice points.
-    `scouts`: number of random positions drawn together from the task's box, whose nearest lattice points are tried when no other points are
-    left.
+    squares has found a posture that only violates tolerances, for example because it has contacts. `hopeless`: largest number of tries
+    of a lattice point at which least squares has found no posture at all. `between`: largest number of tries of an intermediate point,
+    half-way between lattice points. `scouts`: number of random positions in the task's box that are drawn when no other points are left;
+    the lattice points nearest to these positions are then tried.
     """
 
     starts: int = 8
@@ -283,15 +288,15 @@ class LatticeBuilder:
         """Search for poses at the next points of the lattice; return False if the building is finished.
 
         A step tries the points next to vertices. If there are none, it tries failed points again; if none is left, it adds points half-way
-        between lattice points; then it tries random points. The building is finished when no random point is reached, or if no first pose
-        is found.
+        between lattice points; then it tries random points. The building is finished if no pose is found for any of these random points, or
+        if no first pose is found.
         """
         if not self.vertices:
             return self._find_first()
         return self._try_neighbours() or self._retry_failed() or self._add_intermediate() or self._try_random_points()
 
     def state(self) -> dict[str, NDArray[Any]]:
-        """Return the state as arrays by name, without that of `rng`; "q" and "y" are the poses and task coordinates of the vertices."""
+        """Return the state, except that of `rng`, as arrays by name; "q" and "y" are the poses and task coordinates of the vertices."""
         return self._table.state()
 
     def restore(self, state: Mapping[str, NDArray[Any]]) -> None:
@@ -299,7 +304,10 @@ class LatticeBuilder:
         self._table.restore(state)
 
     def result(self) -> tuple[Array, Array]:
-        """Return the poses (V, n) rad and task coordinates (V, m), after the postures of neighbours were made more similar."""
+        """Return the poses (V, n) rad of the vertices and their task coordinates (V, m).
+
+        Before that, the method solves some poses again, so that the postures of neighbours are more similar (`smoothed`).
+        """
         points, q, y = self._table.vertices()
         vertex = self._table.vertex
         pairs = [(k, vertex[one]) for k, neighbours in enumerate(self._lattice.neighbours(points)) for one in neighbours if one in vertex]

@@ -29,11 +29,12 @@ IDLE, FIRST = -1, -2  # in place of a start vertex
 
 
 class SearchScheduler:
-    """Starts and ends L simultaneous searches for new vertices of a roadmap (thesis Algorithm 4).
+    """Starts and ends searches for new vertices of a roadmap, up to L = `settings.searches` at the same time (thesis Algorithm 4).
 
-    `vertex` (L,): the start vertex of each search; IDLE (-1) where no search runs, FIRST (-2) for a search for the first pose. `aim` (L,
-    m): the point to which the search aims, in spacings; NaN without an aim. `near` (L, K, m): the points of the K vertices nearest to this
-    aim; infinite where there are fewer.
+    The attributes are arrays with one row for each search. `vertex` (L,): the start vertex; IDLE (-1) where no search runs, FIRST (-2) for
+    a search for the first pose. `aim` (L, m): the point at which the search aims, in spacings; NaN without an aim. `near` (L, K, m): the
+    points of the K vertices nearest to the aim, or without an aim to the start vertex; infinite where there are fewer. K is 16, 48 or 96
+    for m = 1, 2 or 3, else 192.
 
     Args:
         frontier: the vertices in the task space.
@@ -78,7 +79,7 @@ class SearchScheduler:
         return able & self._frontier.free.any(axis=1) if self._settings.frontier else able
 
     def refill(self) -> None:
-        """Start new searches until L are running, or no vertex is left from which a search may start.
+        """Start new searches until `settings.searches` are running, or no vertex is left from which a search may start.
 
         Vertices with larger expansion weights come first; among vertices with equal weights, the one that was found first.
         """
@@ -214,8 +215,9 @@ _DAMPING = 0.1  # spacings squared
 
 
 def predicted_posture(frontier: Frontier, postures: Array, vertex: int, aim: Array) -> Array:
-    """Return the predicted posture (d,) for a point `aim` (m,), by a linear fit to similar postures around a vertex.
+    """Return the predicted posture (d,) for a point `aim` (m,), by a linear fit to the postures of vertices near `vertex`.
 
+    The fit uses only vertices within 2.5 spacings whose postures differ from that of `vertex` by less than 0.2 in every motor.
     Postures (V, d) and the result are in fractions of the motors' ranges, 0 to 1; `aim` is in spacings.
     """
     near, distances = frontier.nearest(frontier.points[vertex], 6 * frontier.dimensions + 1)

@@ -27,8 +27,10 @@ class SearchSettings:
         std: largest standard deviation of a search from a vertex, in ranges of the motors.
         wide_std: standard deviation of a search for the first pose, or where another search has failed, in ranges of the motors.
         population: samples per generation; None: 4 + 3 ln(d) for d motors that may move.
-        patience: a search fails after this factor times G generations, where 3/4 of the recent successful searches needed at most G.
-        tries: number of failed searches with aims within half a spacing of a point, after which no search aims at this point.
+        patience: factor on the time limit: a search fails after patience * G generations, but not before 100 / m (m: dimension of the task
+            space).  G: number of generations within which 3/4 of the recent successful searches found their vertex.
+        tries: largest number of failed searches around a point.  After so many failed searches with aims within half a spacing of a point,
+            no further search aims at this point.
         searches: number of simultaneous searches.
     """
 
@@ -65,8 +67,8 @@ class RoadmapSettings:
         method: "nes": evolution strategy, thesis Algorithms 2-4, for any costs and coordinates.  "least_squares": on a lattice of task
             points, only for coordinates with derivatives.  "hybrid": least squares if all coordinates have derivatives, then the evolution
             strategy for the points that were not reached.
-        neighbours: number of nearest vertices to which each vertex is joined.  None: each vertex is joined to as many of the vertices found
-            before it as the task space has dimensions (Algorithm 4).
+        neighbours: number of nearest vertices to which each vertex is joined.  None: each vertex is joined to the m nearest of the vertices
+            that were found before it; m: dimension of the task space (Algorithm 4).
         longest: edges along which a motor turns by more than this [rad] are left out.  None: no edge is left out.
         margin: distance that every motor keeps from its limits [rad], at most a quarter of its range.  MoBeE's control law pushes motors
             out of the last 10 degrees, so a robot under this law comes to rest only in poses that keep this margin.

@@ -33,7 +33,10 @@ class TaskIK:
         self._descent = Descent(problem, [pair for number, low in enumerate(task.box[:, 0]) for pair in self._aims(number, float(low))])
 
     def random_starts(self, count: int, rng: np.random.Generator) -> Array:
-        """Draw start poses (count, n) rad: random positions for motors that affect the task or the terms; the others keep their start."""
+        """Draw start poses (count, n) rad for least squares.
+
+        Motors that may move and affect the task or the terms get random positions. All others are at their position in `problem.start`.
+        """
         low, high = self._problem.limits.T
         drawn = rng.uniform(low, high, (count, len(low)))
         return self._problem.whole(np.where(self._descent.drawn, drawn, self._problem.start[self._problem.free]))
@@ -55,8 +58,8 @@ class TaskIK:
 
         Returns:
             Poses (N, n) rad, their task coordinates (N, m), violations (N,) and costs (N,).  A violation is 0 for a pose within all
-            tolerances and the task's box; infinite if least squares fails or the pose misses y or the box; else the sum of weight *
-            residual over the terms that are beyond their tolerances.
+            tolerances and the task's box; infinite if least squares fails, if the pose is outside the box, or if its task coordinates
+            deviate from y by more than `deviations`; else the sum of weight * residual over the terms that are beyond their tolerances.
         """
         free = self._problem.free
         q, converged = self._descent.met(self._problem.whole(np.clip(starts[:, free], *self._problem.limits.T)), self._reals(y))
@@ -101,15 +104,15 @@ SWEEPS = 32
 
 
 def smoothed(ik: TaskIK, wanted: Array, q: Array, y: Array, pairs: Ints, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Make the postures of neighbours more similar: solve some of them again, starting from the mean of their neighbours' postures.
+    """Make the postures of neighbours more similar: solve some poses again, from a start nearer to the mean of their neighbours' postures.
 
     Args:
         ik: solves for task coordinates.
         wanted: (V, m) task coordinates of the lattice points.
         q: (V, n) rad, poses.
         y: (V, m) their task coordinates.
-        pairs: (E, 2) numbers of poses that are neighbours.
-        rng: chooses the poses that are solved in each sweep.
+        pairs: (E, 2) indices of poses that are neighbours.
+        rng: draws, in each of 32 passes, which poses are solved again, and whether each starts at the mean or at half the distance to it.
 
     Returns:
         Poses (V, n) rad and task coordinates (V, m).  A new pose replaces an old one if it is valid and has a smaller sum of squared joint

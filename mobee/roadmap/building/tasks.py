@@ -29,8 +29,8 @@ class Coordinate:
     """One task coordinate y_i: a number computed from a pose, and the range that the roadmap covers.
 
     `low`, `high`: the range, in `unit`. `unit`: that of the coordinate, "m", "rad" or "" (no unit). `function`: computes the coordinate
-    (N,) of a batch of poses q (N, n). `aims`: takes the robot and a value, and returns the residuals (`Aim`s) for least squares that are 0
-    where the coordinate has this value; None if the coordinate has no derivative. Raises InvalidValue unless low < high.
+    (N,) of a batch of poses q (N, n). `aims`: function of the robot and a value; it returns residuals (`Aim`s) for least squares. If
+    these are 0 in a pose, the coordinate has this value. None if the coordinate has no derivative. Raises InvalidValue unless low < high.
     """
 
     name: str
@@ -125,7 +125,7 @@ def motors(ranges: Mapping[str, Range]) -> Task:
 def angle(marker: str, about: ArrayLike, zero: ArrayLike, low: float, high: float, direction: ArrayLike | None = None) -> Task:
     """Return a task space of one coordinate: the angle of a marker's direction about an axis, in (-pi, pi] rad.
 
-    Least squares also makes the direction perpendicular to the axis.
+    Least squares also requires that the direction is perpendicular to the axis; the evolution strategy does not.
 
     Args:
         marker: its name.

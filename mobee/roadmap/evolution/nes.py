@@ -21,7 +21,7 @@ class PathRates:
     Attributes:
         weights: (population,), best sample first; the weights of the better half are positive and their sum is 1, the others are negative.
         effective: effective number of samples in the better half.
-        path: decay of the evolution path (a mean of recent steps of the search) per generation.
+        path: share of the evolution path (a mean of recent steps of the search) that is replaced in each generation.
         damping: damping of the changes of the step size.
         rank_one: learning rate of the shape matrix of the search distribution from the path.
         rank_all: learning rate of the shape matrix from the samples.
@@ -85,7 +85,7 @@ def turned(shape: Array, z: Array, weights: Array, shrink: float) -> Array:
     """Return the updated shape B exp(1/2 (sum_i weights_i z_i z_i^T - shrink I)) of a search distribution, exact to rounding.
 
     `shape`: B (d, d), or its diagonal (d,); the result has the same form. `z`: (k, d) standard normal samples. `weights`: (k,). The sum has
-    at most rank k, so for k < d the series is computed with matrices (k, k).
+    at most rank k; for k < d the Taylor series of the exponential is therefore computed with matrices (k, k).
     """
     if shape.ndim == 1:
         diagonal: Array = shape * np.exp(0.5 * (weights @ z**2 - shrink))

@@ -18,10 +18,11 @@ _NEGLIGIBLE = 1e-12
 
 
 class Searches:
-    """L simultaneous search distributions over d coordinates; the arrays are their whole state.
+    """The normal distributions of L = `count` simultaneous searches over d = `dimensions` coordinates.
 
-    Samples are mean + sigma * shape @ z, with z standard normal. `mean` (L, d). `sigma` (L,): step size. `shape` (L, d, d). `path` (L, d):
-    evolution path. `age` (L,): generations since the search began. `population`: samples per generation of each search.
+    Samples are mean + sigma * shape @ z, with z standard normal. The following arrays contain the state of all searches. `mean` (L, d).
+    `sigma` (L,): step size. `shape` (L, d, d). `path` (L, d): evolution path. `age` (L,): generations since the search began. `population`:
+    samples per generation of each search.
     """
 
     def __init__(self, count: int, dimensions: int, population: int) -> None:
@@ -87,10 +88,11 @@ EVALUATIONS = 100_000
 class Restart:
     """Two conditions, of which each restarts a search: a narrow distribution, and a cost that no longer decreases.
 
-    Restarts begin alternately at a random point of the box and at the first start of the search.
+    Restarts begin alternately at a random point of the box and at the `start` of the search.
 
-    `std`: restart if the largest standard deviation is below this fraction of the box's width. `patience`, `gain`: restart if `patience`
-    generations have not lowered the best cost since the last start by the fraction `gain`.
+    `std`: restart if the largest standard deviation is below this fraction of the box's width. `patience`, `gain`: the best cost since the
+    last start is compared every `patience` generations; restart if it has decreased by less than the fraction `gain` since the comparison
+    before.
     """
 
     std: float = 1e-3

@@ -287,7 +287,8 @@ def term(
             returns N numbers.  A function for one pose (`pose.position(marker)` (3,), contacts a tuple of Contact) that returns one number
             is also accepted; it is called for each pose, which takes longer.
         tolerance: largest value at which the term counts as met; None: the term is only minimised.
-        weight: factor on the value; None: the cost is 1 at ten times the tolerance, and equal to the value without a tolerance.
+        weight: factor on the value. None: 0.1 / tolerance, so that the cost is 1 at ten times the tolerance; or 1 if the tolerance is None
+            or 0.
         name: name of the term; "": the name of the function.
     """
     if not callable(function):
@@ -371,9 +372,10 @@ def aligned(
 def across(marker: str, axis: ArrayLike, direction: ArrayLike | None = None, tolerance: float = RADIANS, weight: float = PER_RAD) -> Term:
     """Return the term that keeps a marker's normal perpendicular to an axis (3,), root frame; its residual is the error angle [rad].
 
-    `direction`: (3,) in the marker's frame, is used instead of the normal. The term has no derivative, but least squares does not need it
-    if the angle of the marker about the same axis is a task coordinate (`mobee.tasks.angle`). A residual of at most `tolerance` (5 degrees)
-    meets the term; the cost is `weight` (2 per rad) times the residual.
+    `direction`: (3,) in the marker's frame, is used instead of the normal. The term has no derivative, so least squares only checks it
+    afterwards. It is met nevertheless if the same direction has a task coordinate `mobee.tasks.angle` about the same axis: for this
+    coordinate, least squares makes the direction perpendicular to the axis. A residual of at most `tolerance` (5 degrees) meets the term;
+    the cost is `weight` (2 per rad) times the residual.
     """
     along, own = unit_vector("axis", axis), None if direction is None else unit_vector("direction", direction)
 

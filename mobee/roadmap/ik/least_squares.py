@@ -26,8 +26,8 @@ class Descent:
 
     Args:
         problem: the aims of its terms with derivatives are minimised; the motors that may move are changed, within their limits.
-        besides: additional aims with their tolerances, for example of task coordinates. The argument `goals` of the methods gives them
-            other goals for each start.
+        besides: additional aims with their tolerances, for example of task coordinates. If the goals of these aims differ between the
+            starts, they are given to the methods as the argument `goals`.
         threads: number of threads that share the starts; the results do not depend on it.
     """
 
@@ -48,14 +48,15 @@ class Descent:
 
     @cached_property
     def drawn(self) -> Flags:
-        """Whether each of the d motors that may move affects an aim or a term, (d,), so that random start poses should vary it."""
+        """Whether each of the d motors that may move affects aims or terms, (d,), and so needs random positions in random start poses."""
         return needed(self._problem, self._aims)
 
     def run(self, q: Array, goals: Array | None = None) -> Array:
         """Search from the start poses q (B, n) rad; return only the K solutions whose residuals are all within the tolerances, (K, n) rad.
 
-        `goals`: (B, 26 k), other goals for the k additional aims `besides` of the constructor: row i holds, for start i, the numbers that
-        `aim_reals` returns for aims of the same kinds, links and motors, in the same order. None: `besides` as given.
+        `goals`: (B, 26 k), for each start its own goals of the k aims in `besides` (an argument of the class). Row i is the result of
+        `aim_reals` for the k aims of start i, which have the same kinds, links and motors as `besides`, in the same order. None: `besides`
+        for all starts.
         """
         ends, met = self.met(q, goals)
         return ends[met]
@@ -63,8 +64,9 @@ class Descent:
     def met(self, q: Array, goals: Array | None = None) -> tuple[Array, Flags]:
         """Return the solutions (B, n) rad found from the starts q (B, n) rad, and whether each is within the tolerances of all aims, (B,).
 
-        `goals`: (B, 26 k), other goals for the k additional aims `besides` of the constructor: row i holds, for start i, the numbers that
-        `aim_reals` returns for aims of the same kinds, links and motors, in the same order. None: `besides` as given.
+        `goals`: (B, 26 k), for each start its own goals of the k aims in `besides` (an argument of the class). Row i is the result of
+        `aim_reals` for the k aims of start i, which have the same kinds, links and motors as `besides`, in the same order. None: `besides`
+        for all starts.
         """
         ends, residuals = self.ends(q, goals)
         met: Flags = (residuals > self._enough).sum(axis=1) == 0
@@ -73,9 +75,10 @@ class Descent:
     def ends(self, q: Array, goals: Array | None = None) -> tuple[Array, Array]:
         """Return the solutions (B, n) rad found from the starts q (B, n) rad, and the residuals of all aims there, (B, aims), m or rad.
 
-        `goals`: (B, 26 k), other goals for the k additional aims `besides` of the constructor: row i holds, for start i, the numbers that
-        `aim_reals` returns for aims of the same kinds, links and motors, in the same order. None: `besides` as given. The columns of the
-        residuals are the aims of the problem's terms, then `besides`. The number of evaluated poses is added to `problem.evaluations`.
+        `goals`: (B, 26 k), for each start its own goals of the k aims in `besides` (an argument of the class). Row i is the result of
+        `aim_reals` for the k aims of start i, which have the same kinds, links and motors as `besides`, in the same order. None: `besides`
+        for all starts. The columns of the residuals are the aims of the problem's terms, then `besides`. The number of evaluated poses is
+        added to `problem.evaluations`.
         """
         from mobee._core.least_squares import descend  # loads the core, so it is imported only when needed
         from mobee.model.engine import robot_handle

@@ -28,9 +28,9 @@ POPULATION = 20
 class IK:
     """The result of `solve_ik`.
 
-    `q`: (n,) rad, the pose. `reached`: whether every term is within its tolerance, by a new evaluation of q. `residuals`: residual of each
-    term, by the term's name. `evaluations`: number of evaluated poses. `table`: all contacts of the pose, also those of fields (larger
-    shapes that cause repulsive forces).
+    `q`: (n,) rad, the pose. `reached`: whether all terms that have a tolerance are within it; q is evaluated again for this. `residuals`:
+    residual of each term, by the term's name. `evaluations`: number of evaluated poses. `table`: all contacts of the pose, also those of
+    fields (larger shapes that cause repulsive forces).
     """
 
     q: Array

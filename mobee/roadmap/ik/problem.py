@@ -55,11 +55,11 @@ _MIN_EFFECT = 1e-9
 
 
 def needed(problem: Problem, aims: Iterable[Aim]) -> Flags:
-    """Return which of the d motors that may move need a random position in the starts of the pose search, (d,).
+    """Return for each of the d motors that may move whether random start poses of the search need a random position of it, (d,).
 
     A motor needs one if it moves a link of one of the `aims` (residuals for least squares), or is the motor of an aim. It also needs one if
-    it changes a term that has a tolerance but no derivative; this is tested in PROBES (3) random poses. The term "collision" is left out:
-    if the fingers, for example, began at random positions, they would only cause more contacts.
+    it changes the residual of a term that has a tolerance but no derivative; this is tested in PROBES (3) random poses. The term
+    "collision" is left out: if the fingers, for example, began at random positions, they would only cause more contacts.
     """
     moves = _movers(problem.model.robot, aims)[problem.free]
     others = [one for one in problem.terms if one.aims is None and one.tolerance is not None and one.name != "collision"]
@@ -94,11 +94,11 @@ Cost = Term | Callable[[Pose, Any], ArrayLike]
 
 
 class Problem:
-    """The search for a pose: a cost, which is a sum of terms, over the d motors that may move; all other motors keep their start.
+    """The search for a pose: a cost, which is a sum of terms, over the d motors that may move; all other motors stay as in `start`.
 
     Attributes: `model` has only solid shapes; `terms` and `by_name` are the terms; `free` (d,) are the indices of the motors that may move;
-    `limits` (d, 2) rad are their limits, reduced by the margin; `start` (n,) rad; `must`: whether a term has a tolerance; `evaluations`
-    counts evaluated poses.
+    `limits` (d, 2) rad are their limits, reduced by the margin; `start` (n,) rad; `must`: whether at least one term has a tolerance, so
+    that a pose can be within all tolerances; `evaluations` counts evaluated poses.
 
     Args:
         model: robot and world.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Terms of the cost of a pose (thesis eqs. 3.1-3.3), and the residuals by which least squares meets them."""
+"""Terms of the cost of a pose (thesis eqs. 3.1-3.3), and their residuals in the form that least squares needs."""
 
 from __future__ import annotations
 
@@ -40,10 +40,10 @@ class Aim:
     """A residual for least squares, in the form that the compiled core reads.
 
     Attributes:
-        kind: a number of KINDS: PLACE (the two points coincide), TURNED (the two frames are parallel), ALONG (the two directions are
-            equal), HOLD (the points are at the distance `length`), FACING (the first direction points to the second point), COORDINATE (a
-            coordinate of the first point has the value `length`), AT_MOST (it has at most this value), MOTOR (a motor is at the value
-            `length`).
+        kind: one of the constants KINDS: PLACE (the two points coincide), TURNED (the two frames are parallel), ALONG (the two directions
+            are equal), HOLD (the points are at the distance `length`), FACING (the first direction points to the second point), COORDINATE
+            (d . (first point - second point) is `length`; d: the first three numbers of `second_frame`), AT_MOST (this product is at most
+            `length`), MOTOR (a motor is at the value `length`).
         first_link: number of the first link; 0: the root frame.
         first_point: (3,) m, in the root frame at the zero pose.
         first_frame: (3, 3), in the root frame at the zero pose; or (9,) with a direction in its first three numbers.
@@ -70,8 +70,8 @@ class Term:
     """One term h_i of the cost of a pose: weight * residual.
 
     `residual`: computes numbers (N,), at least 0, from a batch of poses q (N, n). `tolerance`: a pose with a residual up to this value
-    meets the term; None if the term is only minimised. `aims`: function of the robot that returns the same term as residuals for least
-    squares; None if the term has no derivative.
+    meets the term; None if the term is only minimised. `aims`: takes the robot and returns the residuals of this term for least squares;
+    None if the term has no derivative.
     """
 
     name: str
@@ -97,7 +97,7 @@ def checked_term(
 
 
 def direction_frame(direction: Array) -> Array:
-    """Return a direction (3,) as the nine numbers of an aim's frame: the direction, then zeros."""
+    """Return nine numbers, a direction (3,) and six zeros, which replace the frame of an `Aim` that needs only a direction."""
     return np.concatenate([direction, np.zeros(6)])
 
 
@@ -134,10 +134,11 @@ Plain = Callable[..., ArrayLike]
 
 
 class Function:
-    """Calls a user's function with a batch of poses and the table of their contacts, or for each pose with a tuple of its contacts.
+    """Calls a user's function once for a batch of poses, or once for each pose if the function does not accept a batch.
 
-    The first call tests whether the function accepts a batch, that is, returns the same values for it as for the single poses. `contacts`:
-    False if the function takes only the pose.
+    For a batch, its second argument is the table of all contacts; for one pose, a tuple of the contacts. The first call tests whether the
+    function accepts a batch, that is, returns the same values for it as for the single poses. `contacts`: False if the function takes only
+    the pose.
     """
 
     def __init__(self, function: Plain, contacts: bool = True) -> None:

@@ -18,7 +18,7 @@ NARROWEST = 1e-6  # rad or m: couplings that leave a motor less are not used to 
 
 
 def joint_limits(compiled: Compiled, joint: int) -> Array:
-    """Return the lower and upper limit (2,) of a joint, rad or m; a joint without limits gets one turn, or 2 m, centred at zero.
+    """Return the lower and upper limit (2,) of a joint, rad or m; without limits: -pi to pi, or -1 to 1 m for a slide.
 
     `joint`: MuJoCo's number of the joint.
     """
@@ -32,8 +32,9 @@ def joint_limits(compiled: Compiled, joint: int) -> Array:
 def home_pose(compiled: Compiled, asked: str | None) -> tuple[Array, int | None]:
     """Return MuJoCo's position vector qpos at home, and the number of the keyframe that contains it; None if no keyframe does.
 
-    `asked`: name of the keyframe, or "zero" for every joint at 0. None: the first of the names HOMES ("home", "ready", ...) that a keyframe
-    has, else the only keyframe; else the pose in which the file draws the robot. Raises UnknownName if no keyframe has the name `asked`.
+    `asked`: name of the keyframe, or "zero" for every joint at 0. None: the keyframe whose name is in HOMES ("home", "ready", ...; the
+    first name that exists is used). If there is none, but the file has exactly one keyframe, this keyframe; else the pose in which the file
+    draws the robot. Raises UnknownName if no keyframe has the name `asked`.
     """
     model, names = compiled.model, compiled.names["key"]
     lower = {name.lower(): index for index, name in enumerate(names)}
@@ -49,9 +50,10 @@ def home_pose(compiled: Compiled, asked: str | None) -> tuple[Array, int | None]
 def read_motor(compiled: Compiled, group: list[tuple[int, int, Drive]], home: Array, meant: bool) -> Motor:
     """Return the motor that drives a group of coupled joints.
 
-    `group`: for each joint (index in the robot, MuJoCo's number, drive), the joint with the name of the motor first. `home`: MuJoCo's
-    position vector qpos at home. `meant`: True: home is from a keyframe and is kept, even in a limit zone, a range near a limit in which
-    the control law pushes inward. False: the motor's home is the nearest position outside the zones.
+    `group`: for each joint a tuple (index in the robot, MuJoCo's number, drive); the motor has the name of the first joint. `home`:
+    MuJoCo's position vector qpos at home. A limit zone is a range near a limit in which the control law pushes inward. `meant`: whether
+    home is from a keyframe. True: the position at home is used even if it is in a limit zone. False: it is replaced by the nearest position
+    outside the zones.
     """
     _, master, _ = group[0]
     limits = joint_limits(compiled, master)

@@ -44,9 +44,9 @@ class _Skeleton:
 def read_mjcf(path: Path, options: UrdfOptions | None = None) -> Robot:
     """Return the robot of an MJCF file; `options` None: the defaults.
 
-    Motors are named after their joints; positions are in rad, those of slides in m. A free body is fixed where the file places it, and ball
-    joints are fixed as drawn. Warns (`Simplified`) of elements that are fixed or left out. Raises RobotFileError with file and remedy,
-    InvalidValue for options that are not valid, NotInstalled without the package mujoco.
+    Motors are named after their joints; positions are in rad, those of slides in m. A free body is fixed where the file places it, and a
+    ball joint is fixed in its orientation in the file. Warns (`Simplified`) of elements that are fixed or left out. Raises RobotFileError
+    with file and remedy, InvalidValue for options that are not valid, NotInstalled without the package mujoco.
     """
     options = options or UrdfOptions()
     check_options(options)

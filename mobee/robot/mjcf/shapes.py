@@ -40,7 +40,7 @@ def read_solids(compiled: Compiled, link_of: list[int], meshes: Meshes, corners:
 
 
 def colliding(compiled: Compiled) -> list[int]:
-    """Return the numbers of the geoms that can collide, without the ground; of all geoms but the ground if no geom can collide."""
+    """Return MuJoCo's numbers of the geoms that can collide, or of all geoms if none can; planes and height fields are never included."""
     model = compiled.model
     solid = [geom for geom, kind in enumerate(compiled.geom_kinds) if kind not in WITHOUT_BODY]
     paired = {*model.pair_geom1.tolist(), *model.pair_geom2.tolist()}

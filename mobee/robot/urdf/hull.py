@@ -139,7 +139,7 @@ class Primitive:
 def smallest(points: Array) -> Primitive:
     """Return the smallest sphere, capsule, cylinder or box, by volume, that contains all points (v, 3) m.
 
-    Only axes along the coordinate axes and the main axes of the points are tried.
+    Only axes along the coordinate axes and along the principal axes of the points are tried.
     """
     axes = _axes(points)
     boxes = [_box(points, frame) for frame in axes]
@@ -150,7 +150,7 @@ def smallest(points: Array) -> Primitive:
 def smallest_capsule(points: Array) -> Primitive:
     """Return the smallest capsule, by volume, that contains all points (v, 3) m.
 
-    Only axes along the coordinate axes and the main axes of the points are tried.
+    Only axes along the coordinate axes and along the principal axes of the points are tried.
     """
     return min((capsule_along(points, axis) for frame in _axes(points) for axis in frame.T), key=lambda one: one.volume)
 
@@ -165,7 +165,7 @@ def bounding_sphere(points: Array) -> Primitive:
 def capsule_along(points: Array, axis: Array) -> Primitive:
     """Return the shortest capsule along the unit vector `axis` (3,) that contains all points (v, 3) m.
 
-    Its radius is that of the smallest cylinder around the points along this axis, or larger if the capsule is a sphere.
+    Its radius is that of the thinnest cylinder along this axis that contains all points, computed approximately.
     """
     rotation, centre, radius, off, along = _around(points, axis)
     reach = np.sqrt(np.maximum(radius**2 - off**2, 0.0))  # how far beyond its cap's centre a point may lie

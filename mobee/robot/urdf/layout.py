@@ -37,9 +37,10 @@ class Skeleton:
 
 
 def lay_out(tree: Tree) -> Skeleton:
-    """Lay out a URDF tree at zero pose and return it.
+    """Return the links and joints of a URDF with their frames at zero pose, in the root frame.
 
-    Links of fixed joints, and of joints whose lower and upper limits are equal, are merged into the links that carry them.
+    The child link of a fixed joint, or of a joint without <mimic> whose lower and upper limits are equal, is merged into the parent
+    link.
     """
     skeleton = Skeleton([tree.root], {tree.root: 0}, {tree.root: IDENTITY})
     for joint in tree.walk():

@@ -66,8 +66,8 @@ def mesh_places(given: str, robot_file: Path) -> list[Path]:
 def mesh_name(mesh: MeshSource, path: Path) -> str:
     """Return the name by which a robot file at `path` must name a mesh.
 
-    It is the mesh's present name if no file is found for this name, or if it is a package:// address under which a file is found from
-    `path` too. Otherwise it is the path of the mesh relative to the folder of `path`.
+    It is the path of the mesh's file relative to the folder of `path`. In two cases the present name is kept: if no file is found for it,
+    and if it is a package:// address that leads to a file also when it is searched from `path`.
     """
     found = first_file(mesh_places(mesh.file, mesh.robot_file))
     same = first_file(mesh_places(mesh.file, path)) if mesh.file.partition("://")[0].lower() in PACKAGES else None

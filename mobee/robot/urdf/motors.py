@@ -90,7 +90,8 @@ def joint_limits(joint: UrdfJoint) -> Array:
 def stated_limits(joint: UrdfJoint) -> Array:
     """Return the lower and upper limit (2,) [rad or m] that the file gives a joint; infinite if the file gives no limit.
 
-    A limit beyond 1e6 counts as infinite. If lower is above upper, both count as infinite: files for PyBullet use this notation.
+    A limit beyond 1e6 counts as infinite. If lower is above upper, both count as infinite: files for PyBullet write joints without limits
+    in this form.
     """
     limit = child(joint.node, "limit")
     if joint.kind == "continuous":
@@ -136,8 +137,8 @@ def read_motor(master: UrdfJoint, driven: Sequence[tuple[int, UrdfJoint, Drive]]
     """Return the motor of the joint `master` and of all joints that mimic it; its limits keep every joint within the joint's limits.
 
     `driven`: for each of these joints, `master` included, (index in the robot, joint, drive). `part`: name of the motor's part. The unit is
-    that of `master`: rad, or m if it is prismatic. Home is 0, or the position nearest to 0 outside the limit zones, ranges near the limits
-    in which the control law pushes inward. Warns of limits that are assumed or ignored.
+    that of `master`: rad, or m if it is prismatic. Home is 0 if this is outside the limit zones, else the nearest position outside them. A
+    limit zone is a range near a limit, in which the control law pushes inward. Warns of limits that are assumed or ignored.
     """
     limits = joint_limits(master)
     _warn_of_free(master)

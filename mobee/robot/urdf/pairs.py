@@ -2,10 +2,10 @@
 """The pairs of shapes (solids, and the fields generated around them) of a robot from a URDF that are tested for contacts.
 
 Two shapes on different links are tested, except
-- shapes of adjacent links, unless the SRDF enables them: a joint lies between the two, or several joints at one place (5 cm) with
-  links between them that have no solid, as in a wrist that is written as three joints;
+- shapes of adjacent links, unless the SRDF enables them. Links are adjacent if one joint connects them, or a chain of joints at one place
+  (within 5 cm), such as a wrist that is written as three joints, if the links between have no solid (`adjacent_links`);
 - shapes of links (of the URDF, before fixed joints are merged) whose tests the SRDF disables;
-- fields of one part, as in a zero-position file; if the SRDF does not define the parts, only fields that are not far apart (`far_apart`).
+- fields of one part. But if the SRDF does not define the parts, fields of one part that are far apart are tested (`far_apart`).
 
 Without an SRDF no other pairs are left out; `mobee check` reports shapes that overlap in every pose.
 """
@@ -46,8 +46,8 @@ class PairRules:
 def adjacent_links(joints: Sequence[Joint], shapes: Sequence[Shape]) -> dict[LinkPair, str]:
     """Return the pairs of adjacent links (indices), each with the reason as text.
 
-    Two links are adjacent if one joint connects them, or several joints at one place (within 5 cm) with links between them that have no
-    solid. `joints`, `shapes`: of the robot.
+    Two links are adjacent if one joint connects them. They are adjacent too if a chain of at most six joints connects them, all joints are
+    within 5 cm of the last one, and the links between have no solid. `joints`, `shapes`: of the robot.
     """
     solid = {shape.link for shape in shapes if shape.role == "solid"}
     found: dict[LinkPair, str] = {}

@@ -145,10 +145,10 @@ def _to_root(link: str, tree: Tree) -> list[UrdfJoint]:
 
 
 def read_parts(srdf: Srdf, masters: Iterable[str], drives: Mapping[str, Drive]) -> dict[str, tuple[str, ...]]:
-    """Return the parts of the robot: name of the part -> names of the joints whose motors it has.
+    """Return the parts of the robot: name of the part -> names of the joints that the motors of the part move directly.
 
     The parts are the groups of the SRDF that contain no other group, if every motor is in exactly one of them; else there is one part,
-    "all". `masters`: names of the joints that have a motor. `drives`: the drive of each joint, by name.
+    "all". `masters`: names of all joints that a motor moves directly. `drives`: the drive of each joint, by name.
     """
     everything = tuple(masters)
     motors: dict[str, tuple[str, ...]] = {}
@@ -217,9 +217,10 @@ def _value(node: Node, joint: UrdfJoint) -> float:
 def choose_home(states: Mapping[str, State], asked: str | None, srdf: Path | None) -> Home:
     """Return the home pose of a robot.
 
-    `states`: the poses in the SRDF, by name. `asked`: name of the requested pose, or "zero"; None: the pose with the first of the names
-    HOMES ("home", "ready", ...) that the SRDF has, else its only pose, else "zero", a home without positions. `srdf`: path for the message.
-    In names, upper and lower case do not matter. Raises UnknownName with the valid names.
+    `states`: the poses in the SRDF, by name. `asked`: name of the requested pose, or "zero". None: the pose "home"; if the SRDF does not
+    have it, the next of the names HOMES ("ready", ...) that it has. If it has none of these names, its only pose; if it has several poses
+    or none, "zero". The pose "zero" has no positions, unless the SRDF has a pose of this name. `srdf`: path for the message. In names,
+    upper and lower case do not matter. Raises UnknownName with the valid names.
     """
     lower = {name.lower(): name for name in states}
     if asked is not None:
@@ -233,10 +234,10 @@ def choose_home(states: Mapping[str, State], asked: str | None, srdf: Path | Non
 
 
 def homed(motor: Motor, home: Home, moving: list[UrdfJoint]) -> Motor:
-    """Return a copy of the motor with its home from a pose of the joints; unchanged if the pose has none of the motor's joints.
+    """Return a copy of the motor with the home position that the pose `home` gives it.
 
-    `moving`: the joints of the robot. A home beyond the motor's limits raises RobotFileError if `home.meant` is set; else it causes a
-    warning, and home is the nearest limit.
+    The motor is returned unchanged if the pose has none of its joints. `moving`: the joints of the robot. A home beyond the motor's limits
+    raises RobotFileError if `home.meant` is True; else it causes a warning, and the nearest limit becomes the home.
     """
     for index, scale, offset in motor.joints:
         if moving[index].name not in home.state:

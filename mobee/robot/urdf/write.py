@@ -113,8 +113,9 @@ def write_urdf(robot: Robot, path: str | Path) -> Path:
 
     Every link's frame is at its joint, with the orientation of the root frame at zero pose. One joint represents each motor: the first one
     whose position equals the motor's, else the motor's first joint; the motor's other joints mimic it. Markers are links on fixed joints.
-    `load_robot` reads the file as the same robot, but without the clauses, and with an enclosing hull of at most 64 corners for each convex
-    shape with more. Raises InvalidValue for a joint that no motor or several drive.
+    `load_robot` reads the file as the same robot with these differences: it has no clauses and no cameras; `least_lever` is 0;
+    the visuals are the solids; `zone_ends_at_home` is True for all motors; a convex shape with more than 64 corners is replaced by an
+    enclosing hull with at most 64. Raises InvalidValue for a joint that no motor or several drive.
     """
     path = Path(path)
     drives_of(robot)  # raises for a joint without a master

@@ -49,10 +49,10 @@ _END = re.compile(rb"[ \t]*</robot\s*>")
 
 
 def write_disabled(path: Path, base: Path | None, name: str, pairs: Iterable[tuple[str, str, str]]) -> None:
-    """Write an SRDF file with <disable_collisions> for `pairs` of links, each (link1, link2, reason); the file is complete or unchanged.
+    """Write an SRDF file with <disable_collisions> for `pairs` of links, each (link1, link2, reason).
 
     `base`: an existing SRDF whose text is kept word for word, with the new lines before its end; None: a new file for the robot `name`.
-    Raises RobotFileError if lines cannot be added to that text, or if the file cannot be written.
+    Raises RobotFileError if lines cannot be added to that text, or if the file cannot be written; an existing file is then unchanged.
     """
     lines = [f"<disable_collisions link1={quoteattr(a)} link2={quoteattr(b)} reason={quoteattr(why)}/>" for a, b, why in pairs]
     text = _merged(base, lines) if base is not None else _begun(name, lines)

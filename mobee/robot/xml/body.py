@@ -53,8 +53,8 @@ MOST_SHAPES = 2000  # the number of tested pairs grows with the square
 def read_skeleton(node: Node, draft: Draft, place: Place, centre: Array, axis: Array, length: float) -> None:
     """Add to the draft the solid and the field that the attributes `radius` and `field` of a <link> or <joint> describe.
 
-    Both are cylinders; a field is a volume that causes a repulsive force. `centre`: (3,) m, root frame. `axis`: (3,), of any length.
-    `length`: m. Raises RobotFileError if the element is not valid.
+    Both are cylinders; a field is a volume that causes a repulsive force. `centre`: (3,) m, of the cylinders, root frame. `axis`: (3,),
+    direction of their axis, not necessarily a unit vector. `length`: their length, m. Raises RobotFileError if the element is not valid.
     """
     for attribute, role in (("radius", "solid"), ("field", "field")):
         if node.number(attribute, 0.0) == 0:

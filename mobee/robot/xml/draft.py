@@ -20,10 +20,11 @@ class Draft:
 
     `subtree`: for each link, the index of the element above it that has the attribute noSelfCollision, -1: none. `drives`: for each joint,
     its XML element and the name of its motor. `parts`: name -> its XML elements. `hands`: dict from the index of an element with
-    noSelfCollision to its name, for the reasons of untested pairs. `elements`: the root, and all <link> and <joint> elements. `hosts`: for
-    each shape, the index of its element. `shape_names`: name of a shape -> the next number that makes another name from it. `hides`: camera
-    -> its XML element, and the names of the links that it does not show. `constraints`: part and XML element of each constraint list.
-    `ignores`: <ignore> elements. `others`: included robots, with the XML elements that include them. `where`: (kind, name) -> "file:line".
+    noSelfCollision to its name; the name appears in the reasons why pairs are not tested. `elements`: the root, and all <link> and <joint>
+    elements. `hosts`: for each shape, the index of its element. `shape_names`: name of a shape -> the number that is appended if another
+    shape shall have this name. `hides`: camera -> its XML element, and the names of the links that it does not show. `constraints`:
+    part and XML element of each constraint list. `ignores`: <ignore> elements. `others`: included robots, with the XML elements that
+    include them. `where`: (kind, name) -> "file:line".
     """
 
     links: list[str] = field(default_factory=lambda: ["base"])
@@ -58,10 +59,10 @@ class Place:
     """The position of the reader in the tree of a file.
 
     `point`: (3,) m, root frame, the end of the current <link>, at which the links and joints inside it are attached. `start`: (3,) m, root
-    frame, the start of this <link>, to which its shapes and markers are relative. `link`: index of the robot's link. `carrier`: inside a
-    joint, the link that carries the joint, else the same link; elements with turns="false" belong to it. `part`, `motor`: names of the
-    current part and motor, "": none. `subtree`: index of the element whose attribute noSelfCollision applies, -1: none. `base`: whether
-    shapes belong to the base. `element`: index of the current element.
+    frame, the start of this <link>, to which its shapes and markers are relative. `link`: index of the robot's link. `carrier`: index of
+    the link to which elements with turns="false" belong: directly inside a <joint> it is the link that carries the joint, elsewhere it is
+    `link`. `part`, `motor`: names of the current part and motor, "": none. `subtree`: index of the element whose attribute noSelfCollision
+    applies, -1: none. `base`: whether shapes belong to the base. `element`: index of the current element.
     """
 
     point: Array
@@ -78,7 +79,7 @@ class Place:
 def enter(node: Node, draft: Draft, place: Place, name: str) -> Place:
     """Add a <link> or <joint> to the elements of the draft and return the position of the reader inside it.
 
-    `place`: position outside it. `name`: name of the element, for the reasons of excluded pairs.
+    `place`: position outside it. `name`: name of the element; it appears in the reasons why pairs are not tested (`Draft.hands`).
     """
     index = len(draft.elements)
     if node.flag("noSelfCollision") and place.subtree < 0:

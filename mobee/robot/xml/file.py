@@ -62,7 +62,7 @@ class LineHandler(xml.sax.handler.ContentHandler):
 
 
 def is_file(path: Path) -> bool:
-    """Return whether the path is an existing file; False, not an error, for a name that no file can have."""
+    """Return whether the path is an existing file; also False if the path cannot be checked (name too long, no permission)."""
     try:
         return path.is_file()
     except (OSError, ValueError):
@@ -70,7 +70,7 @@ def is_file(path: Path) -> bool:
 
 
 def is_folder(path: Path) -> bool:
-    """Return whether the path is an existing folder; False, not an error, for a name that no folder can have."""
+    """Return whether the path is an existing folder; also False if the path cannot be checked (name too long, no permission)."""
     try:
         return path.is_dir()
     except (OSError, ValueError):

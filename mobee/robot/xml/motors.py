@@ -121,11 +121,11 @@ def _motor(draft: MotorDraft, joints: tuple[tuple[int, float, float], ...]) -> M
 
 
 def read_clauses(node: Node, part: Part, motors: Sequence[str]) -> Clause:
-    """Return a <constraintList> as a clause: a condition on motor positions q, of which at least one row must hold.
+    """Return the clause of a <constraintList>: a condition on motor positions q, which is met if at least one of its rows holds.
 
     A row holds if a.q + b > 0 or, with the attribute `negate`, if a.q + b < 0. The attribute `q` of a row contains the names of motors of
-    the part, or their numbers within the part. `motors`: the names of all motors of the robot, in the order of q. Raises RobotFileError if
-    the element is not valid.
+    the part, or their indices in the part, from 0. `motors`: the names of all motors of the robot, in the order of q. Raises RobotFileError
+    if the element is not valid.
     """
     rows, offsets = [], []
     for child in (child for child in node if child.tag == "constraint"):

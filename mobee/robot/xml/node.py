@@ -33,7 +33,7 @@ FLAGS = {"true": True, "1": True, "yes": True, "false": False, "0": False, "no":
 class Node:
     """An XML element: tag in lower case, attributes as text, children, file and line.
 
-    `repairs`: for a root element, the faults in the form of the file that were repaired; empty for other elements.
+    `repairs`: for a root element, the repaired faults of the file's XML syntax or encoding; empty for other elements.
     """
 
     file: Path
@@ -65,7 +65,7 @@ class Node:
         return self.finite(name, self.attributes[name])
 
     def finite(self, name: str, text: str) -> float:
-        """Convert a text of the attribute `name` to a number; raises RobotFileError if it is not a finite number, at most 1e18."""
+        """Convert a text of the attribute `name` to a number; raises RobotFileError unless it is one from -1e18 to 1e18."""
         try:
             value = float(text)
         except ValueError:
@@ -133,7 +133,7 @@ class Node:
     def choice(self, name: str, given: str, valid: Collection[str], kind: str) -> str:
         """Return the text `given` if it is one of the `valid` ones; else raise RobotFileError with the nearest valid one.
 
-        `name`: name of the attribute, and `kind`: what the text names; both are for the message.
+        `name`: name of the attribute. `kind`: the kind of thing that the text names, such as "motor". Both are for the message.
         """
         if given not in valid:
             self.fail(name, f"unknown {kind} {shown(given)!r}", f"{nearest(given, valid)}Valid: {listed(valid)}")
@@ -162,7 +162,8 @@ class Node:
 class Remark:
     """A note or warning on how an element was interpreted.
 
-    `what`: the interpretation. `remedy`: for the user. `severity`: "warning" if the element was not read literally, else "note".
+    `what`: the interpretation. `remedy`: for the user. `severity`: `mobee.robot.xml.versions.report` issues a warning for a "warning", and
+    none for a "note".
     """
 
     node: Node
@@ -256,7 +257,10 @@ SPELLING = {"zeropositionkinematictree": "ZeroPositionKinematicTree", "constrain
 
 
 def tree_of(node: Node) -> ET.Element:
-    """Return a node that was read, with all elements inside it, as an ElementTree element; tags get the spelling of the grammar."""
+    """Return a node that was read, with all elements inside it, as an ElementTree element.
+
+    A Node has its tag in lower case; the result has the upper and lower case of the grammar, as in ZeroPositionKinematicTree.
+    """
     root = ET.Element(SPELLING.get(node.tag, node.tag), node.attributes)
     waiting = [(node, root)]
     while waiting:
@@ -269,7 +273,7 @@ def write_tree(root: ET.Element, path: Path, heading: str = "") -> Path:
     """Write an XML file, one element per line, and return its path; `heading`: text of a comment above the root element.
 
     The standard library's writer is recursive and fails beyond some hundred levels; a chain of 500 joints has more.
-    The file is complete or unchanged. Raises OSError.
+    An existing file is replaced only after all is written, so that an error leaves it unchanged. Raises OSError.
     """
     lines = ['<?xml version="1.0" encoding="utf-8"?>'] + ([f"<!--\n{heading.strip().replace('--', '- -')}\n-->"] if heading else [])
     waiting: list[tuple[ET.Element | str, int]] = [(root, 0)]

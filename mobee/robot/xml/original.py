@@ -5,14 +5,15 @@ The rules are those of the published program (kailfrank/MoBeE, 2014):
 
 - a <motor> whose name was defined before refers to that motor, and its other attributes are ignored;
 - a motor without limits has -1 to 1, a joint without limits -180 to 180 deg; a home outside the limits is the nearest limit;
-- elements inside a <link> or <joint> are placed relative to its start, a marker exactly there; a marker without a normal has +x;
+- elements inside a <link> or <joint> are placed relative to its start, a marker at the start itself; a marker without a normal has +x;
 - elements inside a <joint> do not turn with it: they belong to the link that carries the joint;
-- a radius of 0 or less makes no volume, and an unknown tag is skipped, but not the elements inside;
+- a radius of 0 or less makes no volume;
+- an unknown tag is ignored, but the elements inside it are read;
 - a <constraint> outside a <constraintList> is ignored, and so is one that cannot be read;
 - pairs of shapes are tested by the rule of pairs_2014.py; shapes near the root of the tree are never tested against the world.
 
-Older generations: in 2012 `negate` flipped the row of a <constraint>, and so it does here; in 2010 a part was a <branch>,
-limits were called minPosition and maxPosition, and a <box> had x, y and z.
+Older generations: in 2012 the attribute `negate` of a <constraint> reversed its inequality to a.q + b < 0, and so it does here; in 2010 a
+part was a <branch>, limits were called minPosition and maxPosition, and a <box> had x, y and z.
 """
 
 from __future__ import annotations
@@ -54,7 +55,7 @@ class Evidence:
     certain: bool = True
 
     def remark(self) -> Remark:
-        """Return a note for the user that names the programs by whose rules the file is read, and the sign."""
+        """Return a note for the user: for which programs the file was written (`generation`), and the sign that shows it (`what`)."""
         return Remark(self.node, f"read as a file of {self.generation}, for {self.what}", severity="note")
 
 

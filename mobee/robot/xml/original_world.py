@@ -19,9 +19,9 @@ LOWEST = 1e-6  # m; a shorter height axis counts as none, as in Qt
 def rewrite_world_list(root: Node) -> list[Remark]:
     """Rewrite a <WorldList> of 2011 to 2014 into a <World>, in place; return remarks for the user on the interpretation.
 
-    An object of a <WorldList> has a frame and one or more volumes in it; in a <World> each volume is an object. The only volume of an
-    object gets the object's name; several volumes get the name and a number. Colours of 0 to 255 are converted. A target exerted no force
-    in 2014; here it repels all links except the hand that reaches for it.
+    An object of a <WorldList> has a frame, and volumes whose poses are relative to this frame; in a <World> each volume is an object. If an
+    object has one volume, the volume gets the object's name; if it has several, each gets the name with a number appended. Colours of 0 to
+    255 are converted. A target exerted no force in 2014; here it repels all links except the hand that reaches for it.
     """
     remarks = [Remark(root, "read as a world of VirtualSkin or MoBeE, 2011 to 2014: <WorldList>", severity="note")]
     remarks += [Remark(at_line(root, repair.line), repair.what, repair.remedy) for repair in root.repairs]

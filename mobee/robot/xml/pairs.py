@@ -94,8 +94,8 @@ Table = NDArray[np.bool_]
 def ignore_elements(robot: Robot) -> list[ET.Element]:
     """Return the <ignore> elements that describe which pairs of shapes of the robot are not tested for contacts.
 
-    First come the pairs of links that are never tested, with reasons. Then follow, for solids and for fields: parts without tests among
-    their own shapes, pairs of links, and single pairs of shapes.
+    First come the pairs of links that are never tested, with reasons. Then follow, for solids and for fields: parts whose shapes are not
+    tested with each other, pairs of links, and single pairs of shapes.
     """
     elements = []
     for pair, reason in robot.untested.items():
@@ -107,10 +107,11 @@ def ignore_elements(robot: Robot) -> list[ET.Element]:
 
 
 def role_elements(robot: Robot, role: str, pairs: Ints, own: bool) -> list[ET.Element]:
-    """Return the <ignore> elements for the pairs of shapes of one role that are not tested, except those that `robot.untested` covers.
+    """Return the <ignore> elements for the pairs of shapes of one role that are not tested, without the pairs of links in `robot.untested`.
 
     `role`: "solid", or "field", a volume that causes a repulsive force. `pairs`: (p, 2) indices of shapes, the pairs that are tested.
-    `own`: whether the reader of the file also tests fields of one part with each other, so that these need <ignore> elements too.
+    `own`: True: the reader of the file tests fields of one part with each other, unless an <ignore> element excludes them. False: it never
+    tests them, so that they need no <ignore> elements.
     """
     chosen = np.array([k for k, shape in enumerate(robot.shapes) if shape.role == role], dtype=np.intp)
     link = np.array([robot.shapes[k].link for k in chosen], dtype=np.intp)

@@ -308,23 +308,25 @@ def _read_ignore(node: Node, draft: Draft, place: Place) -> None:
 class Trail:
     """The files that are being read when robots include other robots.
 
-    `files`: the chain of files from the first one to the current one, each of which includes the next. `counted`: all files read so far.
+    `files`: the chain of files from the first one to the current one, each of which includes the next. `counted`: all files read so far,
+    for the limit of their number (MOST_FILES).
     """
 
     files: tuple[Path, ...] = ()
     counted: list[Path] = field(default_factory=list)
 
     def into(self, path: Path) -> Trail:
-        """Return the trail with the file `path` as the current one, and count the file."""
+        """Return the trail with the file `path` as the current one, and append the file to `counted`."""
         self.counted.append(path)
         return Trail((*self.files, path.resolve()), self.counted)
 
 
 def read_include(node: Node, trail: Trail, read: Callable[[Path, Trail], Robot]) -> Placed:
-    """Read the file that a <robot> element includes, and return its robot with the prefix of its names and its pose.
+    """Read the file that a <robot> element includes, and return its robot, the prefix of its names, and its pose.
 
-    The pose has the position (px, py, pz); its rotation turns z to (hx, hy, hz), then by `angle` about this axis. `read`: the function that
-    reads a zero-position XML file. Raises RobotFileError if the file is not found or includes itself, or if there are too many files.
+    The position of the pose is (px, py, pz) m. Its rotation has two steps: the smallest rotation that takes the z axis to the direction
+    (hx, hy, hz), then a turn by `angle` [deg] about this direction. `read`: the function that reads a zero-position XML file. Raises
+    RobotFileError if the file is not found or includes itself, or if there are too many files.
     """
     prefix = node.optional("name")
     if prefix and not re.fullmatch("[a-z0-9_]+", prefix):

@@ -5,10 +5,11 @@
 | --- | --- |
 | 2.0 | today's (robots/README.md) |
 | 0.1 | MoBeE 0.1 |
-| 1.0, or none | the programs of 2010 to 2014; or MoBeE 0.1, if a tag or an attribute shows it, because MoBeE 0.1 wrote 1.0 too |
+| 1.0, or none | the programs of 2010 to 2014; or MoBeE 0.1, which wrote 1.0 too, if the file has a tag or attribute that was new in 0.1 |
 
-MoBeE 0.1 differs from today in three rules: elements inside a <link> were placed relative to the link's end, the smallest rotation turned
-a box to its height axis, and a marker without a normal had +z. original.py lists the differences of the older programs.
+MoBeE 0.1 differs from today in three rules: elements inside a <link> were placed relative to the link's end; a box was turned by the
+smallest rotation that takes its y axis to the height axis (hx, hy, hz); and a marker without a normal had +z. original.py lists the
+differences of the older programs.
 """
 
 from __future__ import annotations
@@ -60,8 +61,8 @@ class _Change:
 def upgrade_robot(root: Node) -> list[Remark]:
     """Rewrite the elements of a robot file of any version into today's grammar, in place; return remarks for the user on the changes.
 
-    `root`: the root element. Raises RobotFileError for an unknown version. A fault that was repaired is accepted only in a file of 2010 to
-    2014; in other files it raises RobotFileError.
+    `root`: the root element. Raises RobotFileError for an unknown version. Faults that `mobee.robot.xml.node.read_xml` repaired
+    (`root.repairs`) are accepted only in a file of 2010 to 2014; in other files they raise RobotFileError.
     """
     version, remarks, is_certain = _version(root)
     if version == "1.0":
@@ -78,8 +79,8 @@ def upgrade_robot(root: Node) -> list[Remark]:
 def upgrade_world(root: Node) -> list[Remark]:
     """Rewrite the elements of a world file of any version into today's grammar, in place; return remarks for the user on the changes.
 
-    `root`: the root element. Raises RobotFileError for an unknown version. A fault that was repaired is accepted only in a <WorldList> of
-    2011 to 2014; in other files it raises RobotFileError.
+    `root`: the root element. Raises RobotFileError for an unknown version. Faults that `mobee.robot.xml.node.read_xml` repaired
+    (`root.repairs`) are accepted only in a <WorldList> of 2011 to 2014; in other files they raise RobotFileError.
     """
     if root.tag == "worldlist":
         remarks = rewrite_world_list(root)
@@ -188,7 +189,7 @@ def _turned(node: Node) -> Iterator[_Change]:
 
 
 def report(remarks: list[Remark]) -> None:
-    """Issue a warning (`OlderVersion`) for each remark of severity "warning", that is, for each element that was not read literally."""
+    """Issue a warning (`OlderVersion`) for each remark of severity "warning"; remarks of severity "note" are left out."""
     for remark in remarks:
         if remark.severity == "warning":
             remark.node.warn(f"{remark.what}. {remark.remedy}" if remark.remedy else remark.what, OlderVersion)

@@ -59,7 +59,8 @@ def _color(node: Node) -> Channels | None:
 def read_camera(node: Node, draft: Draft, place: Place) -> None:
     """Read a <camera> and add it to the draft; raises RobotFileError if it is not valid.
 
-    The camera has the rotation of the file; without a rotation it looks along its normal, with the picture upright at zero pose.
+    The camera has the rotation of the file. Without one it looks along the vector (nx, ny, nz), or along -x if this is absent too, and its
+    picture is upright at zero pose. The vector has the axes of the root frame.
     """
     name = node.text("name")
     if name in draft.cameras:
@@ -93,7 +94,8 @@ def finished_cameras(draft: Draft) -> dict[str, Camera]:
 def visual_elements(robot: Robot, link: int, origin: Array, path: Path) -> Iterable[ET.Element]:
     """Yield the <visual> and <camera> elements of a link.
 
-    `link`: its index. `origin`: (3,) m, root frame, the start of the link's element. `path`: path of the file into which they are written.
+    `link`: its index. `origin`: (3,) m, root frame at zero pose, the point to which the positions in the file are relative. `path`: path of
+    the file into which the elements are written.
     """
     for visual in robot.visuals:
         if visual.link == link:

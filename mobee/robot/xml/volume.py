@@ -33,9 +33,9 @@ class Volume:
     """A volume as a file describes it.
 
     `kind`: "sphere", "capsule", "cylinder", "box" or "convex". `size` in m, as in `mobee.robot.robot.Shape`: sphere (radius,); capsule and
-    cylinder (radius, height); box (x, y, z), full edges; convex (). `vertices`: (v, 3) m, of a convex volume, relative to the centre, along
-    its own axes; else None. `centre` (3,) m and `rotation` (3, 3): along the axes of the root frame; the centre is relative to the start of
-    the link or joint that contains the volume.
+    cylinder (radius, height); box (x, y, z), full edges; convex (). `vertices`: (v, 3) m, corners of a convex volume in its
+    own frame, which has its origin at `centre`; None for the other kinds. `centre` (3,) m and `rotation` (3, 3): along the axes of the root
+    frame; the centre is relative to the start of the link or joint that contains the volume.
     """
 
     kind: ShapeKind
@@ -125,8 +125,8 @@ def direction(node: Node, names: tuple[str, str, str], default: tuple[float, flo
 def align(source: Array, target: Array) -> Array:
     """Return the smallest rotation (3, 3) that turns the unit vector `source` (3,) to the unit vector `target` (3,).
 
-    For opposite vectors it is half a turn about x, or about z if the x component of `source` is 0.5 or more. This is right only if `source`
-    is perpendicular to that axis.
+    For opposite vectors it is half a turn about x, or about z if the absolute x component of `source` is 0.5 or more. Such a half turn
+    leads to `target` only if `source` is perpendicular to its axis; for other opposite vectors the result is wrong.
     """
     cosine = float(source @ target)
     if cosine < -0.9:  # the division below would lose all but the first digits

@@ -27,9 +27,10 @@ DIGITS = 1e-14  # m; smaller values are rounding errors of a sum
 def write_xml(robot: Robot, path: str | Path) -> Path:
     """Write a robot to a zero-position XML file (robots/README.md) and return its path.
 
-    Reading the file gives the same kinematics, motors, parts, shapes, pairs, markers, masses, clauses, visuals and cameras. The files of
-    meshes are not copied: the new file names them. The order of shapes may differ, and a convex shape gets the axes of the root frame.
-    Raises InvalidValue for a joint that no motor or more than one drives.
+    Reading the file gives the same kinematics, motors, parts, shapes, pairs, markers, masses, visuals, cameras and clauses (conditions on
+    the positions of motors, `mobee.robot.robot.Clause`). The files of meshes are not copied: the new file names them. The order of shapes
+    may differ. The corners of a convex shape are written along the axes of the root frame, so its rotation becomes the identity. Raises
+    InvalidValue for a joint that no motor or more than one drives.
     """
     drives = drives_of(robot)
     root = ET.Element("ZeroPositionKinematicTree", version=VERSION, robotName=robot.name, adjacency="listed")
@@ -49,10 +50,10 @@ def write_xml(robot: Robot, path: str | Path) -> Path:
 
 
 def write_upgraded(source: Path, target: Path) -> list[Remark] | None:
-    """Write the robot or world file `source` of an older version in today's form to `target`; return remarks for the user on the changes.
+    """Convert a robot or world file from an older version of the format to the present one; return remarks for the user on the changes.
 
-    Comments are left out, and files that `source` includes stay as they are. For a robot in today's form nothing is written, and None is
-    returned. Raises RobotFileError if the file is not valid.
+    `source`: the old file. `target`: the file to be written. Comments are left out, and files that `source` includes stay as they are. For
+    a robot file in the present version nothing is written, and None is returned. Raises RobotFileError if the file is not valid.
     """
     root = read_xml(source, repair=True)
     if root.tag in WORLD_TAGS:

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Calibration of cameras on the robot's own hand: postures, observations, prediction of pixels, least squares, and the file."""
+"""Calibration of a robot's cameras with pictures of its own hand: postures, observations, predicted pixels, least squares, and the file."""

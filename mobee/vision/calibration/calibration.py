@@ -70,8 +70,8 @@ class Calibration:
         covariance: (P, P) of x.
         prior: (P,) standard deviations of the parameters before the calibration.
         misfit: mean squared residual, in standard deviations; 1 if noise and model are as assumed.
-        uncalibrated: errors of the predicted tag with all parameters 0.
-        calibrated: errors of the predicted tag with the parameters x.
+        uncalibrated: distances of the observed tag from its predicted position, with all parameters 0.
+        calibrated: distances of the observed tag from its predicted position, with the parameters x.
         unobservable: directions of the parameters that the pictures do not determine.
     """
 

@@ -48,13 +48,18 @@ class Motion:
 
 
 class Watcher:
-    """A simulated robot with imperfect cameras and a tag on its palm, which moves and takes pictures."""
+    """A simulated robot with imperfect cameras and a tag on its palm, which moves and takes pictures.
+
+    Args:
+        rig: the robot, its cameras and the tag.
+        model: the robot in its world.
+        settings: settings of the cameras.
+        errors: by how much the simulated cameras, encoders and tag differ from the model.
+        seed: seed of the noise of encoders, stamps and pictures, of the room, and of the clutter.
+        has_clutter: whether sheets and discs of paper lie on the boxes of the world.
+    """
 
     def __init__(self, rig: Rig, model: Model, settings: CameraSettings, errors: CameraErrors, seed: int, has_clutter: bool = True) -> None:
-        """Make the robot and its scene; `seed`: of the noise of encoders, stamps and pictures, of the room, and of the clutter.
-
-        `settings` and `errors`: of the cameras. `has_clutter`: whether small objects lie on the table.
-        """
         self.rig, self.settings, self.errors = rig, settings, errors
         self.plant = OfflinePlant(model, seed=seed)
         worn = [] if rig.tag is None else tag_solids(rig.tag, rig.robot, errors.tag)
@@ -100,8 +105,8 @@ def moved_parts(rig: Rig, part: str) -> tuple[str, ...]:
 def watch_hand(watcher: Watcher, postures: Array, part: str, progress: Callable[[float], None] = lambda share: None) -> list[Observation]:
     """Move the head and the arm `part` through postures (K, n) rad; return the observations of the tag from the cameras.
 
-    `progress`: called with the share of postures that are done. Offsets of the head's encoders are simulated by the pictures: the encoders
-    are right, and the head, which carries the cameras, is drawn rotated by the offsets.
+    `progress`: called with the share of postures that are done. Wrong encoders of the head (`CameraErrors.encoders`) are simulated in the
+    pictures: the encoders have the right values, but in the pictures the head, with its cameras, is turned by the offsets.
     """
     rest, found = RESTING * PERIOD + 0.1, []
     for number, posture in enumerate(postures):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Offsets of encoders, estimated while a robot acts and sees its own hand: an extended Kalman filter, and a plant that it corrects."""
+"""Estimates offsets of encoders while a robot acts and sees its own hand: an extended Kalman filter, and a plant that uses the estimate."""
 
 from __future__ import annotations
 
@@ -140,10 +140,10 @@ class JointOffsets:
 class SelfCalibratingPlant:
     """A plant for agents that corrects the encoder values of another plant, from positions at which the robot's hand is seen.
 
-    So each state of an agent still stands for the same true posture when the encoders become wrong. After each action that leaves the robot
-    at rest, `see` is called once, also while an agent is evaluated. Targets and results of actions are in corrected values. For a reach,
-    the target is shifted such that the plant, which uses uncorrected values, brings the true marker to the wanted position. Forces of
-    contacts and limits are computed from uncorrected values.
+    So each state of an agent still means the same true posture after the encoders have become wrong. After each action that leaves the
+    robot at rest, `see` is called once and the estimate is updated, also while an agent is only evaluated and does not learn. Targets and
+    results of actions are in corrected values. For a reach, the target is shifted such that the plant, which uses uncorrected values,
+    brings the true marker to the wanted position. Forces of contacts and limits are computed from uncorrected values.
 
     Args:
         plant: the plant, offline or live, whose encoders may be wrong.
@@ -175,10 +175,11 @@ class SelfCalibratingPlant:
         return self.plant.measure(part) + self._of(part)
 
     def act(self, part: str, target: Array) -> Outcome:
-        """Set the part's attractor and wait until the part settles or times out; return the corrected outcome.
+        """Set the part's attractor and wait until the part settles or times out; return the outcome, with corrected positions.
 
-        `target`: (n_part,) rad in corrected values. A motor whose uncorrected target is beyond its limits moves to the limit. Raises
-        InvalidValue for a target that the plant refuses or that is beyond the limits, and ActionInterrupted on hold, fault or a new run.
+        `target`: (n_part,) rad in corrected values, which must be within the motors' limits. The plant gets the target minus the offsets; a
+        value of this difference beyond a limit is replaced by the limit. Raises InvalidValue for a target beyond the limits, or that the
+        plant refuses, and ActionInterrupted if a hold (a safe stop), a fault or a restart of the robot ends the action.
         """
         offsets = self._of(part)
         if offsets.any():
@@ -197,10 +198,11 @@ class SelfCalibratingPlant:
         self._target = target
 
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
-        """Reach with a marker of the part to the presented target; return the corrected outcome.
+        """Reach with a marker of the part to the presented target; return the outcome, with corrected positions.
 
         `stay`: True: the part stays in the pose in which the force ended; False: the attractor pulls it back. Raises InvalidValue if there
-        is no target, or if the target has a direction for the marker's normal while offsets are not 0.
+        is no target. It is also raised if an offset is not 0 and the target prescribes a direction of the marker's normal
+        (`ReachTarget.normal` or `faces`): this direction is not corrected.
         """
         if self._target is None:
             raise InvalidValue("no target is presented; call present(ReachTarget(position)) first")

@@ -33,11 +33,11 @@ class Eye:
 class Eyes:
     """The E cameras of a robot at one stamp (time of a picture), with the uncertainty of their poses.
 
-    `names`: the cameras; `eyes` and the rows below have the same order. The uncertainty is a factor F (6 E, r): F F' is the covariance of
+    `names`: the cameras; `eyes` and the rows below have the same order. An uncertainty is a factor F (6 E, r): F F' is the covariance of
     the pose errors of all cameras together. F has six rows for each camera: the displacement of its optical centre along x, y and z of the
-    root frame [m], then its rotation about the directions x, y and z of the root frame, through the optical centre [rad]. `noise`: F of
-    errors that are new in each picture (encoders and stamp). `bias`: F of errors that stay the same while the gaze does not change
-    (calibration).
+    root frame [m], then its rotation about the directions x, y and z of the root frame, through the optical centre [rad]. There are two
+    such factors, each with its own r. `noise`: for the errors that are new in each picture (of encoders and stamp). `bias`: for the errors
+    that stay the same while the gaze does not change (of the calibration).
     """
 
     names: tuple[str, ...]

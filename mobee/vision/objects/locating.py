@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""All things that two cameras see: which detections belong to the same thing, and the position of the thing."""
+"""Locates all things that two cameras see: finds the detections that belong to the same thing, and computes its position."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def locate_all(
         things: the things that may be seen.
         detections: the detections in each picture, by name of the camera.
         eyes: the two cameras at the stamp of the pictures.
-        solids: known boxes.  A result that reaches into a box is discarded, since it may be a flat picture of a thing.
+        solids: known boxes.  A thing whose computed shape clearly reaches into a box is left out: it may be only a flat picture on the box.
     """
     found: list[tuple[Placed, Thing, int, int]] = []
     first, second = eyes.names

@@ -19,9 +19,9 @@ SOLID = 0.6  # share of its convex hull that a region must fill: the things are 
 def outlined(name: str, likeness: NDArray[np.float32]) -> list[Detection]:
     """Return the regions of a picture that show the thing `name`, as detections.
 
-    `likeness`: (H, W), proportional to the share of each pixel that shows the thing; 0: none. To get the share, each value is divided by
-    the largest value near the pixel, or by 1 if this is larger. So the values may also be the shares themselves, 0 to 1. Small regions, and
-    regions that are far from convex, are left out.
+    `likeness`: (H, W), either the share of each pixel that the thing covers, 0 to 1, or larger numbers that are proportional to this share.
+    Each value is divided by the largest value in the 5 x 5 pixels around it, unless this is below 1; the result is used as the share. Small
+    regions, and regions that are far from convex, are left out.
     """
     height, width = likeness.shape
     found = []

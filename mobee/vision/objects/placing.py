@@ -47,8 +47,8 @@ class Placed:
         noise: (3, 3) m^2, covariance of the position from errors that are new in each picture.
         bias: (3, 3) m^2, covariance of the position from errors that stay the same while the gaze does not change.
         size_deviation: (g,) m, standard deviations of the size.
-        misfit: px, rms distance of those points of the outlines that fit from the predicted edge of the shape (silhouette).
-        share: share of all points of the outlines that fit, 0 to 1.
+        misfit: px, rms distance of the outlines from the predicted edge of the shape (silhouette), over the points that fit.
+        share: share of the points of the outlines that fit, 0 to 1; a point fits if it is at most 1.2 px from the silhouette.
     """
 
     name: str

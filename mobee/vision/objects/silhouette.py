@@ -45,11 +45,11 @@ def touching(kind: Kind, size: Array, position: Array, rotation: Array, directio
         size: the lengths of the shape, m.
         position: (3,) m, middle of the shape in the camera's frame; the whole shape must be ahead of the camera.
         rotation: (3, 3), from the shape's axes to the camera's frame.
-        directions: unit vectors (K, 2) in the plane at distance 1 of the camera.
+        directions: unit vectors (K, 2) in the image plane x / z, y / z.
 
     Returns:
-        Points (K, 3) m of the shape, from its middle, in the camera's frame; and the coordinates of their images along the directions,
-        (K,).
+        One point of the shape for each direction, relative to its middle, in the camera's frame, (K, 3) m; and the scalar product of the
+        point's image (x / z, y / z) with the direction, (K,).
     """
     if kind == "sphere":
         return _touching_sphere(float(size[0]), position, directions)

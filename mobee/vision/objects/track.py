@@ -58,8 +58,9 @@ class TrackSettings(Settings):
 class Innovation:
     """A seen position compared with the prediction of a track.
 
-    `difference`: (3,) m, seen minus predicted position. `covariance`: (3, 3) m^2, of the difference. `mean`, `spread`: predicted state (9,)
-    and its covariance (9, 9); the state is position m, velocity m/s and bias m.
+    `difference`: (3,) m, seen minus predicted position. `covariance`: (3, 3) m^2, of the difference. `mean`: (9,), the predicted state:
+    position [m], velocity [m/s] and bias [m]. The bias is the error of seen positions that stays the same while the gaze does not change.
+    `spread`: (9, 9), covariance of the state.
     """
 
     difference: Array
@@ -81,8 +82,9 @@ class Innovation:
 class Track:
     """An object that is followed from look to look; a look is a pair of pictures at one time.
 
-    `name`: unique; empty until enough looks have shown the object (`TrackSettings.hits`). `born`, `t`, `seen`: times [s] of the first look,
-    of the newest look, and of the newest look that showed the object. `looks`: whether each of the latest looks showed the object.
+    `name`: unique; empty until enough looks have shown the object (`TrackSettings.hits`). `born`: time [s] of the first look. `t`: time [s]
+    of the newest look. `seen`: time [s] of the newest look that showed the object. `looks`: whether each of the latest looks showed the
+    object.
     """
 
     def __init__(self, thing: Thing, first: Placed, t: float, settings: TrackSettings) -> None:
@@ -144,11 +146,11 @@ class Track:
         return Innovation(placed.position - _SEEN @ mean, covariance, mean, spread)
 
     def best(self, placed: Placed, t: float, turned: float) -> tuple[Innovation, bool] | None:
-        """Return the better innovation of a seen position at time t [s], and whether it is that of a moving object.
+        """Compare a position seen at time t [s] with the prediction; return the comparison, and whether it assumes a moving object.
 
-        An innovation is the comparison of a seen position with the prediction. The prediction at rest is used, unless the object moves or
-        the position is improbable at rest; then the prediction in motion is used. None if the position is too improbable for this track
-        (`TrackSettings.gate`). `turned`: angle [rad] by which the gaze has rotated since the last look (pair of pictures).
+        The prediction is that for an object at rest, unless the object moves already or the position is improbable at rest
+        (`TrackSettings.surprise`); then it is that for a moving object. Return None if the position is also too improbable for a moving
+        object (`TrackSettings.gate`). `turned`: angle [rad] by which the gaze has rotated since the last look (pair of pictures).
         """
         if t > self._moving_until:
             rest = self.innovation(placed, t, turned, moving=False)

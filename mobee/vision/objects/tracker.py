@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Follows several objects: which seen position belongs to which track, when a new object counts, and which name it gets."""
+"""Follows several objects: decides which seen position belongs to which track, and when a new object gets a name."""
 
 from __future__ import annotations
 
@@ -20,8 +20,9 @@ IMPOSSIBLE = 1e6  # cost of a place outside a track's gate
 class Tracker:
     """The tracks of all seen objects of the given things (kinds of objects), in the root frame at the time of the pictures.
 
-    The first object of a thing has the thing's name, further ones are `name_2`, `name_3`. An object that was hidden or moved elsewhere
-    keeps its name: if no other name is left, a new track takes the name of an object that is not seen any more.
+    The first object of a thing has the thing's name; the next ones have the names NAME_2, NAME_3, up to `TrackSettings.most` objects. If
+    all these names are in use, a new track takes the name of an object that was last seen before the track began. So an object that was
+    hidden or moved elsewhere keeps its name.
     """
 
     def __init__(self, things: Sequence[Thing], settings: TrackSettings | None = None) -> None:

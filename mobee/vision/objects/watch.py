@@ -34,8 +34,8 @@ class PictureWatch:
         """Return what is wrong with a picture, or None if nothing is wrong.
 
         "old": the stamp is not newer than the last one. "late": at its arrival the picture is older than the limit `latest` of this watch.
-        "dark": almost nothing is bright. "frozen": the picture is equal to the pictures before, although the camera has noise or a motor
-        has moved.
+        "dark": almost nothing is bright. "frozen": the same picture has come three times in succession from a camera with noise, or came
+        again after a motor had moved by more than 0.02 rad.
 
         Args:
             picture: (height, width, 3) bytes.

@@ -72,8 +72,9 @@ def split_by_pose(poses: Ints, held_out: float, seed: int) -> tuple[Ints, Ints]:
     """Split rows of lessons; return the indices of the rows to learn from, and those of the rows to test with.
 
     `poses`: (N,) index of the teacher's pose in each row; the teacher is the robot that shows the ball. All rows of a pose belong to the
-    same set. `held_out`: share of the poses whose rows are for tests, at least one pose. The rows to learn from are sorted by pose, in
-    random order of the poses, so that the first rows belong to few poses. `seed`: seed of the random order.
+    same set. `held_out`: share of the poses whose rows are for tests, 0 to 1; at least one pose is for tests. In the rows to learn from,
+    the rows of each pose are together, and the poses are in random order. So one can learn from few poses by taking only the first rows.
+    `seed`: seed of the random order.
     """
     each = np.random.default_rng([seed, 0x73706C69]).permutation(np.unique(poses))
     kept = len(each) - max(1, round(held_out * len(each)))

@@ -48,10 +48,11 @@ class Localiser(Protocol):
 
 
 def eye_features(inputs: Array, lens: Lens) -> Array:
-    """Return the inputs (N, 13) with three more columns, (N, 16): the approximate position relative to the head, up to a factor.
+    """Return the inputs (N, 13) with three more columns, (N, 16): the approximate position of the thing relative to the head.
 
-    The position follows from the angles of the eyes: the direction to the thing is about the angle of the eye plus the angle of the thing
-    in the picture, and the distance is about the inverse of the angle between the rays of both eyes. The kinematic model is not used.
+    The unit of this position is about the distance between the eyes. The position follows from the angles of the eyes: the direction to the
+    thing is about the angle of the eye plus the angle of the thing in the picture, and the distance is about the inverse of the angle
+    between the rays of both eyes. The kinematic model is not used.
     """
     flat = (inputs[:, :4].reshape(-1, 2, 2) - (lens.cx, lens.cy)) / (lens.fx, lens.fy)
     tilt, version, vergence = inputs[:, -3:].T
@@ -87,7 +88,10 @@ class Scale:
 
 
 class Regression:
-    """A localiser that learns by a regression with the interface of scikit-learn, on standardised `eye_features` and positions."""
+    """A localiser that learns by a regression from `eye_features` to positions, both standardised.
+
+    The estimator of the regression has the methods `fit` and `predict` of scikit-learn.
+    """
 
     def __init__(self, lens: Lens, make: Callable[[], Any]) -> None:
         """Make a localiser that is not fitted yet; `make`: returns a new estimator, which must predict all three coordinates.
@@ -117,7 +121,7 @@ class Regression:
 class CorrectedStereo:
     """A localiser that triangulates with the kinematic model; it learns corrections of camera mounts and encoder offsets.
 
-    The corrections are found by robust least squares on taught positions.
+    The corrections are found by robust least squares on the positions that are given to `fit`.
     """
 
     def __init__(self, rig: Rig) -> None:
@@ -127,7 +131,8 @@ class CorrectedStereo:
     def fit(self, inputs: Array, places: Array) -> None:
         """Learn the corrections from inputs (N, 13) and positions `places` (N, 3) m, root frame.
 
-        The prior deviations are the default tolerances of `CameraSettings`. Everything learned before is discarded.
+        Each correction has a prior with the mean 0 and the standard deviation from `CameraSettings().deviations`, that is, from the default
+        tolerances. Everything learned before is discarded.
         """
         from scipy.optimize import least_squares
 
@@ -217,8 +222,8 @@ NAMES = (*REGRESSIONS, CORRECTED)
 def localiser(name: str, rig: Rig, seed: int) -> Localiser:
     """Return a new localiser by its name, one of NAMES: a regression of REGRESSIONS, or "corrected stereo".
 
-    `rig`: the robot and its cameras; a regression uses only the lens. `seed`: of the regression. Raises UnknownName for another name. The
-    method `fit` of a regression that needs scikit-learn raises NotInstalled without it.
+    `rig`: the robot and its cameras; a regression uses only the lens. `seed`: of the regression. Raises UnknownName for another name. All
+    regressions except "genetic programming" need scikit-learn: if it is not installed, their method `fit` raises NotInstalled.
     """
     if name == CORRECTED:
         return CorrectedStereo(rig)

@@ -33,9 +33,9 @@ def watch_teacher(
     """Move the teacher through postures (K, n) rad; at each, look at the ball from several postures of the learner; return the lessons.
 
     The teacher is a robot that carries a ball; the learner is a robot with cameras that learns to locate it. All motions are controlled by
-    the control law, which keeps the robots apart. The teacher reports the position of the ball by its own encoders. In each picture the
-    largest ball counts. There is no lesson if a picture shows no ball, or if the sizes of the balls in both pictures differ by more than 35
-    %. A posture that the teacher does not reach is skipped.
+    the control law, which keeps the robots apart. The teacher reports the position of the ball by its own encoders. If a picture shows
+    several balls, the largest one is used. There is no lesson if a picture shows no ball, or if the ball in one picture is more than 1.35
+    times as large as in the other. A posture that the teacher does not reach is skipped.
 
     Args:
         watcher: the simulated robots, with an object "ball" in their world.
@@ -43,7 +43,7 @@ def watch_teacher(
         parts: names of the teacher's parts.
         postures: (K, n) rad, of the teacher.
         looks: number of postures of the learner for each posture of the teacher.
-        share: share of the torso's range that the learner uses, about its home.
+        share: part of the torso's range that the learner uses, 0 to 1; 0: the torso stays at its home posture, 1: the whole range.
         seed: seed of the learner's postures.
     """
     rng, found = np.random.default_rng([seed, 0x6C6F6F6B]), list[Lesson]()

@@ -27,8 +27,8 @@ LIMIT = 0.2  # rad, of the teacher from its limits, which push within 10 degrees
 class Carried:
     """A ball that a robot carries.
 
-    `link`: name of the link, in the model of both robots together. `position`: (3,) m, middle of the ball in the root frame at the zero
-    pose.
+    `link`: name of the link to which the ball is fixed, in the model of both robots together. `position`: (3,) m, middle of the ball in the
+    root frame at the zero pose.
     """
 
     link: str
@@ -50,7 +50,7 @@ def teacher_postures(rig: Rig, model: Model, carried: Carried, rest: Array, volu
         rig: both robots as one model, with the cameras.
         model: the robots in their world, for the contacts.
         carried: the ball.
-        rest: (n,) rad, one posture of all motors: those that do not move the ball stay there; the values of the others are not used.
+        rest: (n,) rad, positions of all motors. A motor that does not move the ball keeps its position; the other values are not used.
         volume: the lowest and the highest corner of the volume, (3,) m each, root frame.
         count: number of postures.
         seed: seed of the random draws.
@@ -82,14 +82,14 @@ def gaze_postures(
 ) -> Array:
     """Return postures (K, n) rad, K <= count, in which both cameras of the model see the ball, without contacts.
 
-    The postures of torso and head are drawn at random.
+    The postures of torso and head are drawn at random; then the head is turned to the ball.
 
     Args:
         rig: both robots as one model, with the cameras.
         model: the robots in their world, for the contacts.
         carried: the ball.
-        posture: (n,) rad, one posture of all motors: those other than torso and head stay there; the values of torso and head are not used.
-        share: share of the torso's range, about its home, in which the torso is drawn.
+        posture: (n,) rad, positions of all motors. All motors except torso and head keep them; the values of torso and head are not used.
+        share: part of the torso's range that is used, 0 to 1; 0: the torso stays at its home posture, 1: the whole range.
         size: width and height of a picture, px.
         count: largest number of postures.
         rng: draws the postures.

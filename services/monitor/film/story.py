@@ -114,9 +114,9 @@ def heading(ink: Any, name: str, moment: float, fonts: Fonts) -> None:
 
 
 def remarks(ink: Any, below: int, fonts: Fonts) -> None:
-    """Write the text that explains the marks beside the robot; `below`: y of the last row of pixels.
+    """Write the legend for the dots and lines in the picture of the robot.
 
-    `ink`: drawing context of Pillow.
+    `ink`: drawing context of Pillow. `below`: y of the lower edge of the picture [pixels].
     """
     top, long = below - 14 * len(REMARKS) - 10, max(fonts.small.getlength(text) for text in REMARKS)
     ink.rounded_rectangle((6, top, 18 + long, below - 4), 5, fill=GROUND)

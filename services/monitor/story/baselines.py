@@ -29,8 +29,8 @@ state-action is predictable if it was tried at least twice, with the same outcom
 class Outcomes:
     """The possible outcomes of all state-actions.
 
-    `states`: up to B next states of each state-action, (S, A, B). `cumulative`: their cumulative probabilities along the last axis, (S, A,
-    B).
+    `states`: next states of each state-action, (S, A, B); a state-action with fewer than B outcomes has further entries of probability 0.
+    `cumulative`: their cumulative probabilities along the last axis, (S, A, B).
     """
 
     states: Ints
@@ -40,8 +40,8 @@ class Outcomes:
 def outcomes_of(learned: Learned, known: Knowledge, space: Space) -> Outcomes:
     """Return the outcomes that an agent has observed in each state-action, with their relative frequencies as probabilities.
 
-    A state-action that was never tried has two outcomes: its goal, with the success rate of all the agent's tries as probability, and else
-    the state in which it begins.
+    A state-action that was never tried gets two outcomes: its goal, and the state in which the action begins. The probability of the goal
+    is the success rate of all the agent's tries.
     """
     found: dict[tuple[int, int], list[tuple[int, float]]] = {}
     (count, actions), missed = known.tries.shape, np.zeros(known.tries.shape)
@@ -66,10 +66,10 @@ def outcomes_of(learned: Learned, known: Knowledge, space: Space) -> Outcomes:
 def baselines(outcomes: Outcomes, exists: NDArray[np.bool_], start: int, transitions: int) -> dict[str, Curve]:
     """Simulate two explorers, "least_tried" and "random", and return the learning curve of each, by name.
 
-    A learning curve is a list of points (number of transitions, share of the state-actions that were tried, share that are predictable), as
-    in `Curve`; it is the mean of 4 simulations. `outcomes`: the possible outcomes of all state-actions, with their probabilities. `exists`:
-    (S, A), True where the state has the action. `start`: state in which every simulation begins. `transitions`: number of
-    transitions of a simulation, of which at most LONGEST (10 000) are simulated.
+    A learning curve is the mean of 4 simulations. It is a list of points (number of transitions, share of the state-actions that were
+    tried, share of the state-actions that are predictable), as defined at `Curve`. `outcomes`: the possible outcomes of all state-actions,
+    with their probabilities. `exists`: (S, A), True where the state has the action. `start`: state in which every simulation begins.
+    `transitions`: length of each simulation; more than LONGEST (10 000) transitions are not simulated.
     """
     transitions = min(transitions, LONGEST)
     rng = np.random.default_rng(SEED)

@@ -39,7 +39,10 @@ class Knowledge:
 
     @property
     def predictable(self) -> float:
-        """The share of the predictable state-actions: tried at least twice, with the same outcome in at least 80 % of the tries."""
+        """The share of the state-actions that are predictable, 0 to 1.
+
+        A state-action is predictable if it was tried at least twice, with the same outcome in at least 80 % of the tries.
+        """
         return float(((self.tries >= PREDICTABLE_TRIES) & (self.usual >= PREDICTABLE_SHARE))[self.exists].mean())
 
     def left(self, first: float) -> Array:

@@ -30,10 +30,10 @@ def space_of(settings: str, robot: Robot) -> Space | None:
 
 @dataclass(frozen=True, eq=False)
 class Spot:
-    """A point on a link by which a part is shown, such as the palm of an arm.
+    """A point on a link that represents a part in pictures and texts, such as the palm for an arm.
 
-    `name`: marker at the point, or a description. `link`: index of the link. `position`: (3,) m, in the root frame with every joint at
-    zero.
+    `name`: name of the marker (named point of a link) at the point; if there is no marker, "end of the" and the name of the part. `link`:
+    index of the link. `position`: (3,) m, in the root frame with every joint at zero.
     """
 
     name: str
@@ -42,10 +42,11 @@ class Spot:
 
 
 def shown_spot(robot: Robot, part: str) -> Spot | None:
-    """Return the point by which a part is shown, such as an arm's palm or the head of a torso; None if the part moves no link.
+    """Return the point that represents a part in pictures and texts, such as the palm for an arm; None if no link moves with the part.
 
-    It is a marker (named point of a link) that the part moves: the one that depends on the fewest motors of other parts; of several such
-    markers, the one that depends on the most motors. If the part moves no marker, a link is chosen by the same rule.
+    It is a marker (named point of a link) that the part moves. The marker is chosen whose position depends on the fewest motors of other
+    parts; if several markers depend on equally few, the one of these that depends on the most motors. If the part moves no marker, a
+    point of a link is used, which is chosen by the same rule.
     """
 
     def rank(link: int) -> tuple[int, int]:

@@ -68,7 +68,7 @@ def wants_sentence(decision: Decision, untried: Sequence[int], actions: Sequence
     """Describe where the agent's plan leads and why.
 
     `untried`: for each state, how many of its actions were never tried. `actions`: for each state, the number of all its actions. The text
-    is empty if these numbers are not known for the last state of the plan.
+    is empty if the last state of the plan has no entry in `untried`; for explorers that do not plan, these numbers are not used.
     """
     if decision.explorer in WITHOUT_PLAN:
         return f"nothing in particular: {WITHOUT_PLAN[decision.explorer]}."
@@ -95,7 +95,7 @@ def reach_sentence(reach: Reach) -> str:
 
 
 def playback_sentence(seen: Playback) -> str:
-    """Describe the state of a motion along the path of a roadmap: its marker, its goal, its phase, and the remaining distance in mm."""
+    """Describe a motion along a path in a roadmap (graph of poses): the moved marker, goal, phase, and remaining distance in mm."""
     marker, left = f"the {title_of(seen.marker)}", f"{1000 * seen.missing:.0f} mm"
     where = seen.place.replace(f"{seen.marker} ", "")  # coordinates of a roadmap are named by their marker
     if seen.phase == "interrupted":

@@ -59,7 +59,9 @@ class _Agent:
 
 
 class Teller:
-    """Makes the texts and values that the page shows about all agents: their actions, outcomes, knowledge and reaches.
+    """Makes the texts and numbers that the page shows about all agents: actions, outcomes, knowledge, and reaches of their parts.
+
+    A reach is a motion of a marker (named point of a link), such as a palm, to a target.
 
     `changed`: names of the values that have changed since the last call of `values`.
     """
@@ -73,7 +75,7 @@ class Teller:
 
     @property
     def parts(self) -> list[str]:
-        """The parts for which a message of their agent, or about a reach, has arrived."""
+        """The parts about which a message has arrived, either from the part's agent, or about a reach of the part."""
         return [part for part in self._colors if part in self._agents]
 
     def forget_run(self) -> None:
@@ -84,7 +86,7 @@ class Teller:
         self.changed |= {"cards", "left", "path"}
 
     def note_decision(self, seen: Decision) -> None:
-        """Store the action that an agent has decided on, and now begins."""
+        """Store the decision of an agent: the action that it has chosen and now begins."""
         agent = self._agent(seen.agent)
         if agent is not None:
             self._drop_playback()
@@ -136,7 +138,7 @@ class Teller:
             self.changed.add("cards")
 
     def note_playback(self, seen: Playback) -> None:
-        """Store the newest message about a motion along the path of a roadmap, in progress or ended."""
+        """Store the newest message about a motion along a path in a roadmap (graph of poses). The motion may have ended."""
         self._playback = seen
         self.changed.add("path")
 

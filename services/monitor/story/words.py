@@ -28,10 +28,10 @@ def title_of(name: str) -> str:
 
 
 def joint_words(name: str, part: str, robot: Robot) -> str:
-    """Return the name of a motor in words, without words that say nothing new.
+    """Return the name of a motor in words, without a prefix that users do not need.
 
-    For example, l_shoulder_pitch of left_arm becomes "shoulder pitch", and panda_joint1 becomes "joint 1". The name of the part, a prefix
-    for the side (such as l_), or else the prefix that all motors of the robot share is removed.
+    For example, l_shoulder_pitch of left_arm becomes "shoulder pitch", and panda_joint1 becomes "joint 1". One prefix is removed, the first
+    of these with which the name begins: the part's name, a side (such as l_), the prefix that all motors of the robot share.
     """
     shared = os.path.commonprefix(robot.motors)
     for prefix in (f"{part}_", *SIDES, shared[: shared.rfind("_") + 1]):
@@ -93,7 +93,7 @@ def _amount(space: Space, index: int, turn: float) -> str:
 def percent(share: float) -> str:
     """Return a share (0 to 1) as whole percent.
 
-    It is "0 %" or "100 %" only if the share is exactly 0 or 1; else "under 1 %" or "over 99 %".
+    A share above 0 that would be rounded to 0 % becomes "under 1 %". A share below 1 that would be rounded to 100 % becomes "over 99 %".
     """
     rounded = round(100 * share)
     if rounded == 0 and share > 0.0:

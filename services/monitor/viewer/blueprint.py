@@ -64,7 +64,7 @@ class Shown:
 def shown_of(robot: Robot, cameras: Sequence[str] = ()) -> Shown:
     """Return what the 3D view shows of a robot and its cameras.
 
-    For the iCub a fixed viewpoint also shows its table; for other robots the viewpoint follows from their size.
+    For the iCub the viewpoint is fixed, so that both robot and table are visible. For other robots it follows from their size.
     """
     parts = tuple(colors_of(robot.parts))
     if robot.name in AT_TABLE:

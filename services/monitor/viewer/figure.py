@@ -68,9 +68,10 @@ def _mesh(points: Array, color: Rgba) -> rr.Mesh3D:
 
 
 def drawn_link(solids: Sequence[LinkSolid]) -> Iterator[tuple[str, rr.AsComponents]]:
-    """Yield (name, components) of each Rerun entity that draws the volumes and meshes `solids` of one link, with every joint at zero.
+    """Yield (name, components) of each Rerun entity that draws one link.
 
-    They are in the root frame. All opaque meshes together are one entity.
+    `solids`: the link's volumes and meshes. The entities are in the root frame, with every joint at zero. All opaque meshes together are
+    one entity.
     """
     opaque = [one.solid for one in solids if one.solid.mesh is not None and one.solid.opacity >= 1.0]
     if opaque:

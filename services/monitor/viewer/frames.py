@@ -52,8 +52,9 @@ class _Part:
 class Frames:
     """A stream that keeps data for open viewers, and also logs to `file` unless it is None.
 
-    Static data are kept for all viewers; changes are kept up to 4 MB. An update is the robot's pose with all that changes with it: only the
-    newest update is kept, and it is built only if a viewer waits for one. The file gets every fourth update.
+    An update is the data logged between `begin_update` and `end_update`: the robot's pose, and what changes with it. Only the newest update
+    is kept. It is made for viewers only if a viewer waits for it; the file gets every fourth update. All static data are kept. Of the
+    other data that are logged while a viewer is open, the newest 4 MB are kept.
     """
 
     def __init__(self, file: rr.RecordingStream | None, layout: rrb.Blueprint, recording_id: str) -> None:
@@ -132,7 +133,8 @@ class Frames:
         """Return the data that a viewer needs after it has shown frame `after`. Any thread may call this.
 
         The call waits for a newer frame for at most `patience` s. The bytes, all little-endian: number of the frame (uint64), its time
-        (float64, s), then pieces of data, each after its length in bytes (uint32). If there is no newer frame, there are no pieces.
+        (float64, s), and pieces of data. Before each piece stands its length in bytes (uint32). If there is no newer frame, there are no
+        pieces.
         """
         give_up = time.monotonic() + patience
         with self._published:

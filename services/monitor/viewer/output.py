@@ -41,7 +41,7 @@ class NoControls:
         raise Refused("the page cannot do that now")
 
     def tend(self, open_pages: set[str]) -> None:
-        """Do nothing, because pages without controls cannot take a part."""
+        """Do nothing: these controls refuse all commands, so a page never controls a part that must be given back to its agent."""
 
 
 class LaterControls:
@@ -54,14 +54,18 @@ class LaterControls:
         self.real: Controls = NoControls()
 
     def do(self, page: str, verb: str, arguments: dict[str, Any]) -> str:
-        """Let `real` execute the command `verb` of the page with the id `page`; return a sentence for the user.
+        """Execute the command `verb` of the page with the id `page`, and return a sentence for the user.
 
-        `arguments`: values of the command, by name. Raises Refused if it cannot be executed.
+        The attribute `real` (the monitor's controls) executes it. `arguments`: values of the command, by name. Raises Refused if it cannot
+        be executed.
         """
         return self.real.do(page, verb, arguments)
 
     def tend(self, open_pages: set[str]) -> None:
-        """Pass the ids of the open pages to `real`, which gives back the parts of pages that are not open any more."""
+        """Pass the ids of the open pages to the attribute `real` (the monitor's controls).
+
+        If a page that controlled parts of the robot has been closed, the monitor's controls give these parts back to their agents.
+        """
         self.real.tend(open_pages)
 
 

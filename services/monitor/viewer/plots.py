@@ -48,7 +48,7 @@ class Plots:
         self._stream.log(f"plots/joints/{part}", rr.Scalars([*motion.q[:SHOWN], *motion.goal[:SHOWN]]))
 
     def log_forces(self, forces: Forces) -> None:
-        """Log the norm of each force term over all motors of the robot [rad/s^2].
+        """Log, for each term of the control law, the norm of its forces on all motors [rad/s^2]; these forces are accelerations.
 
         Model and controller each send some of the terms. Every call logs all terms: those in `forces`, and the newest norms of the others.
         """
@@ -59,7 +59,10 @@ class Plots:
         self._stream.log("plots/forces", rr.Scalars(list(self._strengths.values())))
 
     def log_transition(self, part: str, seen: Transition) -> None:
-        """Log a transition's reward [nats], value, and index in the agent's sequence; nothing for a part without a plot."""
+        """Log the reward [nats], the value and the number of a transition; nothing for a part without a plot.
+
+        The agent's transitions are numbered from 1 in the order of time.
+        """
         if part not in self._parts:
             return
         for quantity, value in zip(LEARNED, (seen.reward, seen.value, float(seen.n)), strict=True):

@@ -37,9 +37,10 @@ class Stretch:
 
 
 def sweep(robot: Robot) -> list[Stretch]:
-    """Return a section for each motor (home, minimum, maximum, home), and one in which all motors move at once.
+    """Return the sections of a motion through the ranges of all motors. Each section begins and ends at home.
 
-    Each section begins and ends at home.
+    In the section of a motor only this motor moves: from home to its minimum, then to its maximum, then to home. In the last section all
+    motors move at once.
     """
     low, high = robot.limits.T
     home = np.clip(robot.home, low, high)

@@ -22,9 +22,9 @@ DIGITS = 4  # of lengths in m
 def shapes_of(robot: Robot, colors: dict[str, Color]) -> list[dict[str, Any]]:
     """Return all shapes of a robot as JSON data: a dict with "link", "kind", "size", "position", "rotation", "part" and "name" for each.
 
-    "link": index of the link. "size", "position": [m]. "rotation": (3, 3). Shapes are placed as with every joint at zero, in the root
-    frame. "part": index of the part in `colors`; -1: none. "field": True, only if the shape is a field, that is, not solid but a volume
-    that causes a repulsive force. "vertices": (v, 3) m, only of a convex shape.
+    "link": index of the link. "size": [m]. "position" [m] and "rotation" (3, 3): pose of the shape in the root frame when every joint is at
+    zero. "part": index of the part in `colors`; -1: none. A field, a volume that is not solid but causes a repulsive force, also has
+    "field": True. A convex shape also has "vertices": (v, 3) m.
     """
     return [_shape(shape, list(colors)) for shape in robot.shapes]
 
@@ -70,7 +70,11 @@ def body_at(robot: Robot, q: Array, contacts: list[ContactItem]) -> dict[str, An
 
 
 def contacts_of(contacts: list[ContactItem]) -> list[dict[str, Any]]:
-    """Return a list of dicts, one per contact: "kind", names of the two shapes ("first", "second"), and "point" (3,) m, root frame."""
+    """Return a list of dicts, one per contact.
+
+    "kind": "solid" if both volumes are solid; "field" if one is a field, a larger volume that only causes a force. "first", "second": names
+    of the two volumes. "point": (3,) m, root frame.
+    """
     return [{"kind": c.kind, "first": c.first, "second": c.second, "point": _rounded(np.array(c.point))} for c in contacts]
 
 

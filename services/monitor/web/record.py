@@ -29,7 +29,10 @@ class Entry:
 
 
 class Record:
-    """The file of the recorded values, to which lines are appended, up to 500 MB. Any thread may write."""
+    """The file that records the values of the page, one line of JSON for each value, up to 500 MB.
+
+    A line that would exceed this size is not written. Any thread may write.
+    """
 
     def __init__(self, path: Path, now: Callable[[], float]) -> None:
         """Open the file `path` of the recorded values; `now`: returns the robot's time [s]."""
@@ -38,9 +41,10 @@ class Record:
         self._now, self._lock, self._size = now, Lock(), path.stat().st_size
 
     def put(self, name: str, text: str) -> None:
-        """Append a value, given as JSON text, with the present time.
+        """Append a value, its name and the robot's present time to the file.
 
-        Some names are recorded seldom or never: curves at most every 10 s, the body not at all.
+        `text`: the value as JSON. The values named curves and baselines are written at most every 10 s of the robot's time; those named
+        body, control and events are never written.
         """
         now = self._now()
         if name in LEFT_OUT or now < self._next.get(name, now):

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Serves the page on loopback: its files, changes of the board, data of the 3D view, and commands from pages that have the key."""
+"""The web server of the page, on loopback: sends its files, the new values on the `Board` and the 3D view, and receives commands.
+
+Commands need the key, a secret word in the address of the page. A page without the key shows everything, but cannot send commands.
+"""
 
 from __future__ import annotations
 
@@ -48,9 +51,10 @@ class Controls(Protocol):
         """
 
     def tend(self, open_pages: set[str]) -> None:
-        """Do the regular work, such as to give back the parts of pages that are not open any more; called once per second.
+        """Do the regular work of the controls; called once per second.
 
-        `open_pages`: ids of the open pages.
+        For example, if the page that has taken parts of the robot is closed, these parts are given back to their agents. `open_pages`: ids
+        of the open pages.
         """
 
 
@@ -67,10 +71,11 @@ class Frames(Protocol):
 
 @dataclass
 class Pages:
-    """The open pages. Each page chooses an id, which is the key of all fields.
+    """The open pages. Each page chooses an id, which is the key of the three dicts.
 
     `seen`: monotonic time of its last request [s]. `shown`: newest version of the board (the values of the page) that it has shown. `late`:
-    delay of the body and of the 3D view that it shows [s of robot time]. `lock`: protects the fields.
+    delays of its pictures behind the robot [s of robot time]: "body" (the page's own drawing) and "viewer" (the 3D view). `lock`: protects
+    the fields.
     """
 
     seen: dict[str, float] = field(default_factory=dict)
@@ -79,7 +84,11 @@ class Pages:
     lock: threading.Lock = field(default_factory=threading.Lock)
 
     def note(self, page: str, shown: int, late: dict[str, float]) -> None:
-        """Record a request of a page: the version of the board that it has shown, and its delays `late` [s of robot time], by name."""
+        """Store what a page has reported with a request.
+
+        `page`: its id. `shown`: newest version of the board (the values of the page) that it has shown. `late`: delays of its pictures
+        behind the robot [s of robot time]: "body" (the page's own drawing) and "viewer" (the 3D view), each only if it is shown.
+        """
         with self.lock:
             self.seen[page], self.shown[page], self.late[page] = time.monotonic(), shown, late
 
@@ -91,7 +100,7 @@ class Pages:
             return set(self.seen)
 
     def have_shown(self, version: int) -> bool:
-        """Return whether every open page has shown the version `version` of the board, or a newer one."""
+        """Return whether every open page has shown the version `version` of the board (the values of the page), or a newer one."""
         return all(self.shown.get(page, version) >= version for page in self.open())
 
 
@@ -142,7 +151,7 @@ class PageServer:
         threading.Thread(target=self._tend, daemon=True, name="tend").start()
 
     def let_pages_show(self, patience: float) -> None:
-        """Wait until every open page has shown the present values of the board, but at most `patience` s."""
+        """Wait until every open page has shown the newest values in `site.board`, but at most `patience` s."""
         version, give_up = self.site.board.version, time.monotonic() + patience
         while not self.site.pages.have_shown(version) and time.monotonic() < give_up:
             time.sleep(0.02)

@@ -70,8 +70,9 @@ def _surface(one: LinkSolid, parts: Sequence[str]) -> Surface:
 def encoded(surfaces: Sequence[Surface]) -> bytes:
     """Encode surfaces as the bytes that the page reads, all little-endian.
 
-    Order: length of the header in bytes (uint32); the header, JSON padded with spaces, with link, part, colour and numbers of vertices and
-    triangles of each surface; then for each surface its vertices and normals (float32) and triangles (uint32).
+    Order: length of the header in bytes (uint32); the header; then for each surface its vertices and normals (float32) and triangles
+    (uint32). The header is a JSON list, padded with spaces: for each surface its link, part and colour, and how many vertices and triangles
+    it has.
     """
     rows = [
         {"link": one.link, "part": one.part, "color": one.color, "vertices": len(one.vertices), "triangles": len(one.triangles)}
@@ -91,7 +92,7 @@ Made = tuple[Array, Array, Ints]  # vertices, normals, triangles, in the frame o
 def flat(corners: Array) -> Made:
     """Return triangles with flat shading as vertices (3 t, 3), normals (3 t, 3) and indices (t, 3).
 
-    `corners`: (t, 3, 3) m: t triangles, their three corners, and x, y, z. Triangles share no vertices.
+    `corners`: (t, 3, 3) m; corners[i, j] is the position (x, y, z) of corner j of triangle i. Triangles share no vertices.
     """
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)

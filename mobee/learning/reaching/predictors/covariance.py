@@ -67,7 +67,7 @@ def default_parameters(reaches: Reaches) -> Array:
 def joint_squares(reaches: Reaches) -> Array:
     """Return for each joint the squared differences between the samples of all pairs of states, shape (d, S, S).
 
-    They are in units of the spread of the joint's samples (largest minus smallest).
+    Before that, the samples of each joint are divided by their spread (largest minus smallest).
     """
     scaled = (reaches.samples / np.maximum(np.ptp(reaches.samples, axis=0), 1e-9)).T
     squares: Array = (scaled[:, :, None] - scaled[:, None, :]) ** 2

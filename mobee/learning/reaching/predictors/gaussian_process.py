@@ -26,11 +26,13 @@ MAX_CACHE = 300e6  # bytes of rows and covariances of queried targets, of one ta
 class Query:
     """The cache of one target for which predictions were asked: intermediate results of Gaussian process regression, and the prediction.
 
-    `at`: the features of the reaches from all S states for this target. `prior`: (S, S), the covariance of their rewards before any reach.
-    `rows`: as argument the number of rows to reserve; as attribute (n, S), with a row for each of the n reaches so far and a column for
-    each state: the inverse of the Cholesky factor times the covariance of reaches and states. The first `done` rows are final, and `sure`
-    is the prediction (mean and covariance) from them. The first `upto` rows are computed; the prediction from all of these is `mean` (S,),
-    as a difference from the prior mean, and `covariance` (S, S).
+    Arguments: `at`: the features of the reaches from all S states for this target. `prior`: (S, S), the covariance of their rewards before
+    any reach. `rows`: number of rows to reserve.
+
+    Attributes: `rows`: an array with a row for each observed reach and S columns: the inverse of the Cholesky factor times the covariance
+    of observed reaches and states. `upto`: number of rows that are computed. `mean` (S,), a difference from the prior mean, and
+    `covariance` (S, S): the prediction from these rows. `done`: number of rows in complete blocks, which are not computed again. `sure`:
+    the prediction from the first `done` rows alone, a tuple of mean and covariance.
     """
 
     def __init__(self, at: Points, prior: Array, rows: int) -> None:
@@ -74,9 +76,9 @@ class Posterior:
         return self._used
 
     def about(self, target: Array) -> tuple[Array, Array]:
-        """Return the mean (S,) and the covariance (S, S) of the mean rewards of all states for a target (3,) m, root frame.
+        """Return the posterior mean (S,) and covariance (S, S) of the mean rewards of all states for a target (3,) m, root frame.
 
-        The prior mean is subtracted from the mean.
+        The posterior mean is given as a difference from the prior mean.
         """
         known = self._updated(target)
         return known.mean, known.covariance
@@ -155,12 +157,12 @@ class GaussianProcess:
     """Predicts rewards by Gaussian process regression.
 
     It is exact up to about 2500 pairs of state and target; with more pairs, near targets of a state are merged. Use it for spaces of some
-    hundred states: time and memory grow with the square of this number. A repeated query of a target takes less than a millisecond, the
-    first query up to 30 ms after many reaches.
+    hundred states: time and memory grow with the square of this number. After many reaches, the first prediction for a target takes up to
+    30 ms; a repeated one takes less than a millisecond.
 
     Args:
         reaches: the reach actions: the marker's position in each state.
-        refits: numbers of reaches after which the parameters of the covariance are fitted again.
+        refits: the parameters of the covariance are fitted again when the total number of reaches is one of these numbers.
     """
 
     def __init__(self, reaches: Reaches, refits: tuple[int, ...] = REFITS) -> None:
@@ -197,7 +199,7 @@ class GaussianProcess:
         return deviation
 
     def sample(self, target: Array, rng: np.random.Generator) -> Array:
-        """Return a random sample of the mean rewards of all states for a target (3,) m, shape (S,), with their correlations."""
+        """Return a random sample from the joint posterior of the mean rewards of all states for a target (3,) m, shape (S,)."""
         mean, covariance = self._about(target)
         jitter = JITTER * self._covariance.prior * np.eye(len(mean))
         drawn: Array = self._prior_mean(target) + mean + np.linalg.cholesky(covariance + jitter) @ rng.standard_normal(len(mean))
@@ -233,8 +235,9 @@ class GaussianProcess:
 def thinned(known: Reached, most: int) -> tuple[Ints, Array, Array, Array]:
     """Return state (n,), target (n, 3) m, average reward (n,) and number of tries (n,) of the pairs of state and target.
 
-    If there are more than `most` pairs, near targets of the same state are merged: in larger and larger cells of a grid, until there are
-    few enough. At least one pair of each state remains.
+    If there are more than `most` pairs, those of the same state whose targets lie in the same cell of a cubic grid are merged into one pair
+    with the average target and reward, weighted by the number of tries. The grid is made coarser until at most `most` pairs remain, or all
+    targets of each state are merged; so at least one pair of each state remains.
     """
     state, raster, step = known.state, *RASTER
     which = np.arange(len(known))

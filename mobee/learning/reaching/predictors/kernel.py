@@ -46,7 +46,10 @@ class Kernel(Independent):
 
     @property
     def scales(self) -> tuple[float, float]:
-        """The widths of the kernels: of the poses, in units of the spread of the samples, and of the targets, in m."""
+        """The widths (standard deviations) of the two Gaussian kernels, first the one over poses, then the one over targets.
+
+        The width over poses is a fraction of the spread of each joint's samples (largest minus smallest), the width over targets is in m.
+        """
         return self._scales
 
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:

@@ -46,7 +46,11 @@ class LinearArm:
         return expected
 
     def fitted(self, known: Reached) -> LinearArm:
-        """Return a new arm whose compliance and linear function fit the average rewards of the pairs in `known` with least squares."""
+        """Return a new arm with the compliance, offset and slope that fit the observed rewards best (least squares).
+
+        `known`: the reaches observed so far; the arm is fitted to the average reward of each pair of state and target. The compliance is
+        one of COMPLIANCES; the slope has a weak prior of 1, and is at least 0.
+        """
         target = known.places[known.target]
         return min((self._with(compliance, known, target) for compliance in COMPLIANCES), key=lambda found: found[0])[1]
 

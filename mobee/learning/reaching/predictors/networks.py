@@ -123,8 +123,8 @@ def layers(weights: list[Array], biases: list[Array], inputs: Array) -> list[Arr
 def slopes(weights: list[Array], biases: list[Array], inputs: Array, rewards: Array, copies: Array) -> list[Array]:
     """Return the derivatives of half the mean squared error of the networks: with respect to the weights of each layer, then to the biases.
 
-    `weights`, `biases`: as for `layers`. `inputs`: (networks, n, features). `rewards`: (networks, n). `copies`: (networks, n), how often
-    each reach counts.
+    `weights`: of the three layers, each (networks, inputs, outputs); `biases`: each (networks, 1, outputs). `inputs`: (networks, n,
+    features), of n reaches. `rewards`: (networks, n), observed. `copies`: (networks, n), weights of the squared errors of the reaches.
     """
     first, second, predicted = layers(weights, biases, inputs)
     out = ((predicted[..., 0] - rewards) * copies)[..., None] * predicted * (1.0 - predicted) / inputs.shape[1]

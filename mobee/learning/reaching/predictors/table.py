@@ -15,10 +15,10 @@ NOISE = 0.05  # standard deviation of a reward around its mean, before there are
 
 
 class Table(Independent):
-    """Predicts for each pair of state and target a weighted mean of the rewards of the pair and the average of all pairs.
+    """Predicts a weighted mean of two averages: that of the rewards with the same state and target, and that of all such pairs.
 
-    The fewer rewards a pair has, the more the average of all pairs counts. The model: the mean rewards of pairs are normally distributed
-    around the average of all pairs, and the rewards of a pair around its mean reward.
+    The fewer rewards a pair has, the more weight the average of all pairs has. The model: the mean rewards of pairs are normally
+    distributed around the average of all pairs, and the rewards of a pair around its mean reward.
 
     Args:
         reaches: the reach actions, one for each state.

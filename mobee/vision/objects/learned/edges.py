@@ -19,10 +19,11 @@ SQUARE = np.ones((3, 3), np.bool_)
 
 
 def sharpened(picture: Picture, shares: Floats) -> Floats:
-    """Return the shares (H, W) of a thing in each pixel with sharper edges, from the shares that a network computed.
+    """Return the shares (H, W) of each pixel that a thing covers, with sharper edges than the shares that a network computed.
 
-    The network's shares are smooth at an edge. There, the colour of a pixel is a mixture of the colours inside and outside, and the
-    proportion of the inside colour is the share. `picture`: (H, W, 3).
+    The network's shares are smooth at an edge. There, the colour of a pixel is a mixture of the colours inside and outside of the thing. So
+    the fraction of the inside colour in this mixture is returned as the share. `picture`: (H, W, 3). `shares`: (H, W), those of the
+    network, 0 to 1.
     """
     labels = label(shares >= 0.5, diagonal=True)
     found = shares.copy()

@@ -21,10 +21,10 @@ WHOLE = 0.99  # share of an outline within the picture, and of its hull that is 
 class Quality:
     """The quality of a detector on labelled pictures.
 
-    `pictures`: number of pictures. `found`: by thing, the share of its wholly visible outlines that were found, that is, some detection has
-    its middle within 2 px of the middle of the outline; NaN if there were no such outlines. `error`: median distance of these two middles,
-    over the found outlines, px. `false_regions`: number of detections per picture whose middle does not show the thing. `seconds`:
-    processor time per picture.
+    `pictures`: number of pictures. `found`: by name of the thing, the share of its wholly visible outlines that were found; NaN if there
+    were no such outlines. An outline is found if the middle of a detection of the thing is less than 2 px from the middle of the outline.
+    `error`: median of this distance over the found outlines, px. `false_regions`: number of detections per picture whose middle does not
+    show the thing. `seconds`: processor time per picture.
     """
 
     pictures: int

@@ -62,7 +62,9 @@ class Network:
             )
 
     def shares(self) -> Shares:
-        """Return a function that runs the network: from a picture (H, W, 3) to the share of each of N things in each pixel, (N, H, W).
+        """Return a function that runs the network: it takes a picture (H, W, 3) and returns an array (N, H, W).
+
+        For each of N things and each pixel, this is the share of the pixel that the thing covers, 0 to 1.
 
         Raises InvalidValue if OpenCV cannot read the network, and NotInstalled without OpenCV. The function raises InvalidValue if OpenCV
         cannot run the network.
@@ -87,8 +89,9 @@ class Network:
 def network_of(things: Sequence[Thing], first: Layer, second: Layer, third: Layer) -> Network:
     """Return the network with these three layers; a layer is a pair of weights (inputs, outputs) and bias (outputs,).
 
-    The 150 inputs of the first layer are an array (2, 3, 5, 5), flattened: near or far pixels, colour (red, green, blue), row, column. The
-    5 x 5 far pixels have a spacing of 5 pixels. Raises NotInstalled without ONNX.
+    The 150 inputs of the first layer are a flattened array (2, 3, 5, 5). Its axes are: the set of pixels (0: near, 1: far), colour (red,
+    green, blue), row and column. The near pixels are 5 x 5 adjacent ones, the far ones 5 x 5 with a spacing of 5 pixels. Raises
+    NotInstalled without ONNX.
     """
     onnx = _imported("onnx")
     helper, arrays = onnx.helper, onnx.numpy_helper

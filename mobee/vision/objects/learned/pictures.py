@@ -34,7 +34,10 @@ BRIGHTNESS = (0.6, 1.1)  # factor on the picture
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Labelled:
-    """A labelled picture: `picture` (H, W, 3), and `shares` (H, W, N), the share of each of N things in each pixel."""
+    """A labelled picture.
+
+    `picture`: (H, W, 3). `shares`: (H, W, N), the share of each pixel that each of N things covers, 0 to 1.
+    """
 
     picture: Picture
     shares: Floats
@@ -43,8 +46,8 @@ class Labelled:
 def labelled_pictures(robot: Robot, world: World, things: Sequence[Thing], count: int, seed: int) -> Iterator[Labelled]:
     """Yield `count` pictures of imperfect cameras with random postures, positions of the things, rooms, clutter and brightness.
 
-    A quarter of the objects in the room, and of the paper on the world's boxes, has the colours of the things. `seed`: of everything
-    random. Raises InvalidValue if the robot has no camera.
+    A quarter of the objects in the room have colours of the things, and so has a quarter of the sheets of
+    paper on the world's boxes. `seed`: seed of all random draws. Raises InvalidValue if the robot has no camera.
     """
     cameras = cameras_of(robot)
     if not cameras:

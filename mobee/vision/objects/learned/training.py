@@ -85,8 +85,8 @@ def train(
 def held_out(robot: Robot, world: World, things: Sequence[Thing], pictures: int, seed: int) -> Iterator[Labelled]:
     """Yield test pictures for a network that `train` made with the same arguments.
 
-    They are a fifth as many as the pictures from which the network learned, and different from them. `pictures`, `seed`: as for `train`:
-    number of pictures to learn from, and seed.
+    These pictures are drawn with another seed than those from which the network learned. Their number is a fifth of `pictures`, at least 1.
+    `pictures` and `seed` are the arguments that were given to `train`.
     """
     return labelled_pictures(robot, world, things, max(1, pictures // 5), seed + OTHERS)
 
