@@ -9,15 +9,16 @@ The roadmap has three poses of the right arm of `icub`: at the right of a ball, 
 through the ball is shorter than the path over it.  The real processes run with PyBullet (with --backend mujoco: MuJoCo), with ticks of 10
 ms that follow the clock (free mode), and the default control law at full speed.  A crossing is a motion from right to left, and begins with
 a new roadmap; 0.1 to 1.2 s after its start the ball becomes an obstacle in the model, and a body in the simulator.  The bump is the first
-tick at which the model reports a contact of the arm, solids or fields, with the ball.  There the motion ends, the edge is removed, and the
-arm moves at once to the next vertex of the new path.  The new path is under way from the first tick in which a command that was computed
-after the request of this vertex is in force.  Also measured: when the joints stop approaching the old goal, which depends on the control
-law.
+tick at which the model reports a contact of the arm with the ball; overlap with a field, the larger volume around a link, counts too.  Then
+the motion ends, the edge is removed, and the arm is commanded at once to the next vertex of the new path.  The new path is under way from
+the first tick in which the motors execute a command that was computed after this request.  Also measured: when the joints stop approaching
+the old goal, which depends on the control law.
 """
 
 from __future__ import annotations
 
 import argparse
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -128,11 +129,12 @@ def _crossings(folder: Path) -> list[Measures]:
 class Measures(Struct, frozen=True):
     """Measurements of one crossing: a motion of the arm from the right of the ball to its left.
 
-    `bumped`: whether the arm touched the ball on the short path.  `command`: time [ms] from the bump until a command that was computed
-    after the request of the new goal is in force.  `turn`: time [ms] from the bump until the joints stop approaching the old goal.  Both
-    are -1 without a bump.  `on`: goal vertex of each motion, in order, also of motions that ended early.  `arrived`: whether the arm
-    reached the other side.  `seconds`: duration.  `deepest`: depth [m] of the deepest solid contact with the ball, by the simulator.
-    `thinking`: processor time [ms] from the end of the failed motion to the request of the next motion.
+    `bumped`: whether the arm touched the ball on the short path; this first contact is the bump.  `command`: time [ms] from the bump until
+    the motors execute a command that was computed after the request of the new goal.  `turn`: time [ms] from the bump until the joints stop
+    approaching the old goal.  Both are -1 without a bump, inf if no motion followed.  `on`: the vertices to which the arm was commanded, in
+    order; motions that ended early are included.  `arrived`: whether the arm reached the other side.  `seconds`: duration.  `deepest`:
+    depth [m] of the deepest solid contact with the ball, by the simulator.  `thinking`: processor time [ms] from the end of the failed
+    motion to the request of the next motion.
     """
 
     bumped: bool
@@ -148,7 +150,8 @@ class Measures(Struct, frozen=True):
 def measure(folder: Path) -> list[Measures]:
     """Compute the measures of each crossing of a launch from its recording, write them into its folder, and return them in order.
 
-    A launch is one start of the live system, with a few crossings.  `folder`: folder of the launch.
+    A crossing is a motion of the arm from the right of the ball to its left.  A launch is one start of the live system, with a few
+    crossings.  `folder`: folder of the launch.
     """
     q = read_positions(folder, robot())
     touches = [touch for touch in read_touches(folder / CONTACTS, 1.0 / RATE) if BALL in touch.pair]
@@ -196,11 +199,13 @@ def _bump(crossing: Crossing) -> int:
 
 def _measured(crossing: Crossing, q: Array, deepest: float) -> Measures:
     motions = crossing.motions
-    failed = next((number for number, motion in enumerate(motions[:-1]) if motion.bump >= 0), None)
+    failed = next((number for number, motion in enumerate(motions) if motion.bump >= 0), None)
     common: dict[str, Any] = {"on": [motion.vertex for motion in motions], "arrived": motions[-1].vertex == LEFT and motions[-1].bump < 0}
     common |= {"seconds": (motions[-1].ended - motions[0].asked) / RATE, "deepest": deepest}
     if failed is None:
         return Measures(False, -1.0, -1.0, **common, thinking=0.0)
+    if failed == len(motions) - 1:
+        return Measures(True, math.inf, math.inf, **common, thinking=0.0)
     bump, new = motions[failed].bump, motions[failed + 1]
     turn = _turned(q, bump, motions[failed].vertex, new.ended)
     command = 1e3 * (new.commanded - bump) / RATE
@@ -217,10 +222,11 @@ def _turned(q: Array, bump: int, vertex: int, ended: int) -> int:
 def findings(crossings: Sequence[Measures]) -> dict[str, Any]:
     """Return the results of the crossings as a dict with the keys "live" and "claims".
 
-    "live": a dict with the numbers of "crossings", of those "with_a_bump", and of those that "arrived"; and, if there was a bump, the
-    median and the maximum (endings "_ms_median" and "_ms_most") of the times "command", "turn" and "thinking" of `Measures` [ms], and
-    "at_once_around", how often the arm took the path above the ball at once.  "claims": a list with the judged claims, as dicts
-    (`Claim.record`).
+    "live": a dict with the number of "crossings", the number "with_a_bump" (contact of the arm with the ball), and the number that
+    "arrived" on the other side.  If there was a bump, it also has the median and the maximum [ms] of the times "command", "turn" and
+    "thinking" of `Measures`, with keys such as "command_ms_median" and "command_ms_most"; and "at_once_around", the number of crossings in
+    which the arm, after the bump, moved to the vertex above the ball and from there to its left, without other motions.  "claims": a list
+    with the judged claims, as dicts (`Claim.record`).
     """
     bumped = [one for one in crossings if one.bumped]
     row: dict[str, Any] = {"crossings": len(crossings), "with_a_bump": len(bumped), "arrived": sum(one.arrived for one in crossings)}
@@ -269,10 +275,11 @@ CLAIMS = (around, soon, harmless)
 
 
 def figure(folder: Path) -> Path:
-    """Draw two filmstrips as in thesis figure 4.7, and return their path: the short path through the ball, and the path around it.
+    """Draw two filmstrips as in thesis figure 4.7 into one file, and return the path of this file.
 
-    `folder`: of the run.  The second strip shows the first recorded crossing.  A second file gets the distributions of the times after the
-    bump.  Raises InvalidValue if no crossing is finished, or if the poses of the first one are missing.
+    The first strip shows the short motion through the ball, the second one the motion around it, in the first recorded crossing.  A second
+    file gets the distributions of the times after the bump.  `folder`: of the run.  Raises InvalidValue if no crossing is finished, or if
+    the poses of the first one are missing.
     """
     crossings, kept = _crossings(folder), _kept_poses(folder)
     plot_times(crossings).savefig(folder / "replanning-times.png", dpi=110)
@@ -312,10 +319,10 @@ def _motion(q: Array, times: Array, solid: float) -> Motion:
 
 
 def plot_times(crossings: Sequence[Measures]) -> Any:
-    """Return a figure of the distributions of two times [ms] after the bump.
+    """Return a figure of the distributions of two times [ms] after the bump, the first contact of the arm with the ball.
 
-    They are the time until a command of the new path is in force, and until the joints stop approaching the old goal.  `crossings`: the
-    measures of each crossing.
+    They are the time until the motors execute a command of the new path, and the time until the joints stop approaching the old goal.
+    `crossings`: the measures of each crossing.
     """
     drawing = new_figure(6.0, 3.4)
     axes = drawing.subplots()

@@ -38,16 +38,18 @@ def folder(tmp_path: Path) -> Path:
     motions = [acted(LEFT, 10, BUMP, 41), acted(ABOVE, 41, -1, 80), acted(LEFT, 80, -1, END)]
     append_done(tmp_path, Crossing(20, motions))
     append_done(tmp_path, Crossing(20, [acted(LEFT, 10, -1, 50)]))
+    append_done(tmp_path, Crossing(20, [acted(LEFT, 10, BUMP, 50)]))
     return tmp_path
 
 
 def test_bump_command_turn_and_contacts(folder: Path) -> None:
-    first, through = measure(folder)
+    first, through, ended = measure(folder)
     assert first.bumped and first.arrived and first.on == [LEFT, ABOVE, LEFT]
     assert first.command == pytest.approx(30.0) and first.turn == pytest.approx(10.0 * (TURN - BUMP))
     assert first.deepest == pytest.approx(1e-3) and first.seconds == pytest.approx(1.1)
     assert not through.bumped and through.arrived
-    assert read_measured(folder) == [first, through]
+    assert ended.bumped and not ended.arrived and np.isinf([ended.command, ended.turn]).all()
+    assert read_measured(folder) == [first, through, ended]
     assert read_job(folder, Job) == Job([0.1])
 
 
@@ -56,6 +58,8 @@ def test_few_crossings_leave_the_claims_open_and_slow_ones_refute_them(folder: P
     assert {claim["verdict"] for claim in findings([first])["claims"]} == {"open"}
     verdicts = [claim["verdict"] for claim in findings(10 * [first])["claims"]]
     assert verdicts == ["confirmed", "met", "met"] and len(verdicts) == len(CLAIMS)
+    lost = findings([*10 * [first], measure(folder)[2]])["claims"]
+    assert [claim["verdict"] for claim in lost] == ["not reproduced", "not met", "met"]
 
 
 def test_the_short_path_leads_through_the_ball_and_the_long_one_beside_it() -> None:
