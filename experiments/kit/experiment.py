@@ -35,7 +35,7 @@ Holds = bool | None | Literal["stronger"]
 
 @dataclass(frozen=True)
 class Envelope:
-    """The outcomes of a claim in several settings of something that the publications leave open.
+    """The outcomes of a claim in several settings; the publications leave open which setting was used.
 
     `what`: what differs between the settings, as "unit of distance".  `holds`: the outcome in each setting, by the setting's name, as "1
     cm": True, False, None (not decided) or "stronger" (the effect is larger than published).
@@ -70,7 +70,8 @@ def verdict_of(holds: Holds | Envelope, is_aim: bool = False, untested: bool = T
     Args:
         holds: the outcome in the only setting; or an Envelope with the outcome of each setting.
         is_aim: whether the claim is an aim of our own.
-        untested: whether a failure could have a cause that the publications leave open and that the experiment kept fixed.
+        untested: whether an untested setting could explain a failure: the publications leave it open, and the experiment did not vary
+            it.
     """
     each = list(holds.holds.values()) if isinstance(holds, Envelope) else [holds]
     fails, undecided = False in each, None in each or not each
@@ -95,8 +96,8 @@ def in_settings(what: str, rule: Rule, settings: Mapping[str, Any]) -> Measured 
     of the first.  The outcome is an Envelope with the outcome of each setting; if only one setting has enough runs, it is that setting's
     outcome.
 
-    A rule may itself return an Envelope, over inner settings.  If this Envelope is the same in all settings, it is the outcome.  If not,
-    the outcome is one Envelope with an entry for each pair of a setting and an inner setting.
+    The rule may vary something else inside each setting (the inner settings), and return an Envelope of them.  If this Envelope is the same
+    in all settings, it is the outcome.  If not, the outcome is one Envelope with an entry for each pair of a setting and an inner setting.
     """
     each = {name: found for name, runs in settings.items() if (found := rule(runs)) is not None}
     if not each:
@@ -105,13 +106,14 @@ def in_settings(what: str, rule: Rule, settings: Mapping[str, Any]) -> Measured 
     text = "; ".join([text, *(f"with {name}: {other}" for name, (other, holds) in others if holds != first)])
     if len(each) == 1:
         return text, first
-    if not any(isinstance(holds, Envelope) for _, holds in each.values()):
-        return text, Envelope(what, {name: holds for name, (_, holds) in each.items() if not isinstance(holds, Envelope)})
+    plain = {name: holds for name, (_, holds) in each.items() if not isinstance(holds, Envelope)}
+    if len(plain) == len(each):
+        return text, Envelope(what, plain)
     inner = {name: holds for name, (_, holds) in each.items() if isinstance(holds, Envelope)}
     if all(envelope == first for envelope in inner.values()) and len(inner) == len(each):
         return text, first
     both = {f"{outer}{_PAIR}{name}": found for outer, envelope in inner.items() for name, found in envelope.holds.items()}
-    return text, Envelope(f"{what}{_PAIR}{next(iter(inner.values())).what}", both)
+    return text, Envelope(f"{what}{_PAIR}{next(iter(inner.values())).what}", both | plain)
 
 
 def _by_setting(envelope: Envelope) -> str:
@@ -141,12 +143,14 @@ class Claim:
         ours: our numbers with their intervals.
         verdict: one of VERDICTS, which states their meanings.
         settings: in which settings the claim holds and in which it fails, as text; "" if it is judged in one setting.
-        p: p value: the smallest error rate of the intervals, at least MIN_RATE (0.001), at which the verdict stays the same; 1 if the
-            intervals do not decide at the usual rate of 0.05; None if the verdict uses no interval.
+        p: p value of the verdict.  The error rate of an interval is one minus its confidence level; p is the smallest error rate, at least
+            MIN_RATE (0.001), with which the verdict is the same as with 0.05.  1: the verdict is open with 0.05; None: the verdict uses no
+            interval.
         rule: function that measures and judges the claim: the function below the decorator `claim`, or one of experiments.kit.rules.
         varies: what differs between the settings in which the claim is judged, as "unit of distance"; the rule gets the runs of one
             setting, and the experiment groups its runs by setting.  "": there is one setting, or the rule itself returns an Envelope.
-        untested: what the publications leave open and no run varies, if it could explain a failure; "" if there is nothing.
+        untested: settings that could explain a failure, as text: the publications leave them open, and no run varies them; "" if there
+            are none.
     """
 
     source: str
@@ -227,14 +231,18 @@ class Method(Protocol):
         """Add the options of the experiment to the parser, which has `--seed`, `--runs`, `--resume` and `--json` already."""
 
     def run(self, arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-        """Run the experiment with these options, and return its results as JSON values; `folder`: where it writes what is finished."""
+        """Run the experiment with the options in `arguments`, and return its results as JSON values.
+
+        `folder`: folder of the run, into which `run` writes each part of the run that is finished.
+        """
 
     def recorded(self, folder: Path) -> AbstractContextManager[Path]:
-        """Return a context manager that yields the folder whose files are kept in the repository as the raw record of a finished run.
+        """Return a context manager that yields a folder with the files for the raw record of a finished run.
 
-        The raw record is the copy of those files that match `kept`; the results can be computed from it again.  `folder`: folder of the
-        run.  The yielded folder is `folder` itself, which has other files, too; or, if the experiment keeps only a summary of its values, a
-        temporary folder with files that have the summary, which is deleted when the context ends.
+        The raw record is an archive in the repository.  It has those files of the yielded folder that match `kept`; the results can be
+        computed from them again.  `folder`: folder of the run; usually it is also the yielded folder.  If the experiment keeps only a
+        summary of its values, a temporary folder is yielded.  Its files have the summary in place of the values.  It is deleted when the
+        context ends.
         """
 
     def results(self, folder: Path) -> dict[str, Any]:
@@ -249,9 +257,10 @@ class Steps:
     """A `Method` made of functions, for an experiment that is not a sweep.
 
     `add_arguments`, `run`, `figure`, `kept`: as in `Method`.  `recomputed`: function that computes the results from the folder of a run;
-    None for an experiment without claims.  `summary`: function that replaces the values of each cell (a finished part of a run) by a
-    summary of them, for the raw record (the files kept in the repository), if the files `kept` are cells.  The results must be the same
-    with the summary, and a summary of a summary must be equal to it.
+    None for an experiment without claims.  `summary`: function that returns a summary of the values of a cell (a finished part of a run);
+    the raw record (the files kept in the repository) then has the summaries in place of the values.  None: it has the values.  Only for an
+    experiment whose files `kept` are cells.  The results must be the same with the summaries, and the summary of a summary must be equal to
+    it.
     """
 
     add_arguments: Callable[[argparse.ArgumentParser], None]
@@ -262,9 +271,10 @@ class Steps:
     summary: Callable[[dict[str, Any]], dict[str, Any]] | None = None
 
     def recorded(self, folder: Path) -> AbstractContextManager[Path]:
-        """Return a context manager that yields the folder whose files are the raw record of a run, as in `Method.recorded`.
+        """Return a context manager that yields the folder with the files for the raw record of a run, as in `Method.recorded`.
 
-        It is the run's folder; or, if there is a `summary`, a temporary folder with the summaries of the cells.
+        It is the run's folder.  If there is a `summary`, it is a temporary folder with the run's cells (its finished parts), in which
+        summaries stand in place of the values.
         """
         return nullcontext(folder) if self.summary is None else reduced_cells(folder, self.summary)
 
@@ -299,9 +309,9 @@ class Experiment:
     notes: str = ""
 
     def repetitions(self, made: int | None) -> str:
-        """Return a text such as "10 seeds" or "1 seed"; `made`: number of repetitions of a run, None or 0: the text is "no seeds".
+        """Return the number of repetitions of a run as text: "10 seeds", "1 seed" or "no seeds".
 
-        The word is the name of the option in `repeats`.
+        `made`: the number; 0 and None give "no seeds".  The word "seeds" stands for the name of the option in `repeats`.
         """
         return f"{made or 'no'} {self.repeats.removesuffix('s') if made == 1 else self.repeats}"
 

@@ -97,6 +97,9 @@ def test_the_settings_of_a_claim_are_judged_one_by_one_and_their_text_says_where
     inner = Claim("thesis 8", "", "", rule=lambda runs: ("", Envelope("gain", runs)), varies="unit")
     (nested,) = judged([inner], {"1": {"a": True, "b": False}, "3": {"a": False, "b": False}})
     assert nested["settings"] == "unit / gain: holds with 1 / a; fails with 1 / b, 3"
+    mixed = Claim("thesis 8", "", "", rule=lambda runs: ("", Envelope("gain", runs) if isinstance(runs, dict) else runs), varies="unit")
+    (found,) = judged([mixed], {"1": {"a": True, "b": True}, "3": False})
+    assert found["settings"] == "unit / gain: holds with 1; fails with 3"
     (same,) = judged([inner], {"1": {"a": True, "b": False}, "3": {"a": True, "b": False}})
     assert same["settings"] == "gain: holds with a; fails with b"
 
