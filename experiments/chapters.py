@@ -41,8 +41,8 @@ def section(table: Sequence[tuple[str, Claim]], untested: Callable[[str, str], s
     """Return the published claims as Markdown: a section for each chapter of the thesis, with the claims grouped by verdict.
 
     `table`: pairs of an experiment's name and one of its claims; claims that are aims of our own, not published, are left out.  `untested`:
-    function that takes the name of an experiment and the text of a claim, and returns what the publications leave open and no run varied,
-    as text ("" if there is nothing).
+    function that takes the name of an experiment and the text of a claim.  It returns, as text, the conditions that the publications do not
+    specify and that no run varied ("" if there are none).
     """
     published = [(name, claim) for name, claim in table if not claim.is_aim]
     lines = list[str]()

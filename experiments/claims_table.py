@@ -94,19 +94,20 @@ def stated() -> Rows:
 
 
 def recorded() -> Recorded:
-    """Return the content of claims.json, from which the page was last written: table entries by the experiment's name; {} without the file.
+    """Return the table entries in claims.json, by the experiment's name; {} if the file does not exist.
 
-    An entry has the measured claims, the number of seeds and the commit of a run.
+    An entry has the measured claims, the number of seeds and the commit of a run.  `write_page` writes this file together with
+    experiments/README.md.
     """
     return {current_name(name): entry for name, entry in read(RECORD).items()} if RECORD.exists() else {}
 
 
 def rows(record: Mapping[str, Mapping[str, Any]], confirms: bool = False) -> Rows:
-    """Return all claims as pairs of the experiment's name and the claim, with the recorded numbers and verdicts as far as there are any.
+    """Return all claims as pairs of the experiment's name and the claim, with numbers and verdicts if they are recorded.
 
     `record`: the table's entries, by the experiment's name.  `confirms`: take the numbers of the later runs with new seeds, which confirm
-    the first runs, instead of those of the first runs.  A claim becomes open if its p value is too large among those of all claims, as
-    decided by `largest_rate`.
+    the first runs, instead of those of the first runs.  A claim becomes open if its p value is above the limit that `largest_rate` computes
+    from the p values of all claims.
     """
     entries = {name: entry.get(CONFIRMED, {}) if confirms else entry for name, entry in record.items()}
     measured = {(name, c["source"], c["text"]): Claim(**c) for name, entry in entries.items() for c in entry.get("claims", ())}
@@ -117,9 +118,10 @@ def rows(record: Mapping[str, Mapping[str, Any]], confirms: bool = False) -> Row
 
 
 def largest_rate(p: Sequence[float]) -> float:
-    """Return the largest p value with which a decision still counts, by the procedure of Benjamini and Hochberg (1995); 0 if none counts.
+    """Return the largest p value that a decision may have, by the procedure of Benjamini and Hochberg (1995); 0 if all are rejected.
 
-    `p`: the p values of all decisions.  At most the share FALSE_DISCOVERIES (0.05) of the decisions that count is expected to be wrong.
+    Decisions with larger p values are rejected.  The expected share of wrong decisions among the others is at most FALSE_DISCOVERIES
+    (0.05).  `p`: the p values of all decisions.
     """
     ordered = sorted(p)
     allowed = [FALSE_DISCOVERIES * rank / len(ordered) for rank in range(1, len(ordered) + 1)]
@@ -197,7 +199,8 @@ def better(before: Recorded, after: Recorded) -> Recorded:
 def replaced(before: Recorded, after: Recorded) -> Recorded:
     """Return the record `before` with the entries of `after` in place of those with the same names.
 
-    The part "confirmed" of an entry, which is of a run with new seeds, is kept from `before`.
+    An entry can have a part "confirmed": the entry of a later run with new seeds.  This part is kept from `before` if the entry of `after`
+    has none.
     """
     kept = {name: {CONFIRMED: entry[CONFIRMED]} for name, entry in before.items() if CONFIRMED in entry}
     return before | {name: kept.get(name, {}) | entry for name, entry in after.items()}
@@ -231,9 +234,9 @@ def _confirms(run: Path) -> bool:
 
 
 def require_seeds(folders: Sequence[Path], confirms: bool) -> None:
-    """Raise InvalidValue if a run has new seeds (from CONFIRMING_SEED, 1000, on); with `confirms`, if a run has other seeds.
+    """Raise InvalidValue if a run has seeds of the wrong kind; new seeds are those from CONFIRMING_SEED (1000) on.
 
-    `folders`: the folders of the runs.
+    `folders`: the folders of the runs.  `confirms`: True: all runs must have new seeds; False: no run may have new seeds.
     """
     for folder in folders:
         if _confirms(folder) != confirms:
@@ -242,11 +245,12 @@ def require_seeds(folders: Sequence[Path], confirms: bool) -> None:
 
 
 def keep_records(found: Mapping[str, Finished], record: Recorded, confirms: bool = False) -> list[str]:
-    """Write the raw records (archives of the values of all seeds) of those runs whose numbers are in the table into experiments/records.
+    """Write the raw records of runs, archives with the values of all seeds, into experiments/records.
 
-    `found`: the runs by the experiment's name.  `record`: the table's entries.  `confirms`: whether the runs have new seeds.  Returns a
-    message for each run whose raw record is too large; the raw records of the others are written.  Raises InvalidValue for a run with new
-    seeds if the rules are not the frozen ones, or if an earlier run with new seeds is recorded already.
+    Runs whose numbers are not in the table are ignored.  `found`: the runs by the experiment's name.  `record`: the table's entries.
+    `confirms`: whether the runs have new seeds.  Returns a message for each run whose raw record is too large; the raw records of the
+    others are written.  Raises InvalidValue for a run with new seeds if the experiment's rules differ from the frozen ones (see
+    `require_frozen`), or if another run with new seeds is recorded already.
     """
     failed = []
     for name, one in found.items():

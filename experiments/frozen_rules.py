@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The frozen rules: the claims of each experiment and the constants of its module, among them the thresholds, in `frozen.json`.
 
-The rules were chosen when the results of the first seeds were known.  After the rules are frozen, an experiment can be run once with new
-seeds, and is judged by the frozen rules.  From then on its rules cannot be changed by freezing them again.
+The rules were chosen when the results of the first runs, with the first seeds, were already known.  Then they are frozen, that is, written
+to the file.  After that, an experiment can be run once with new seeds, and is judged by the frozen rules.  After this run, `freeze` raises
+InvalidValue if the rules of the experiment would change.
 """
 
 from __future__ import annotations
@@ -32,8 +33,8 @@ def rules_of(name: str) -> Rules:
     """Return the rules of an experiment as JSON values, under two keys.
 
     "claims": dict from the text of each claim to its published number.  "constants": dict from the name of each public constant to its
-    value: the numbers, texts and collections of them in the experiment's module, and in those modules of `experiments.claims` that it
-    imports as modules.
+    value.  The constants are those of the experiment's module, and of those modules of `experiments.claims` that it imports as whole
+    modules.  Only constants whose values are numbers, texts, or collections of them are included.
     """
     module = importlib.import_module(EXPERIMENTS[name])
     imported = [one for one in vars(module).values() if isinstance(one, ModuleType) and one.__name__.startswith("experiments.claims.")]

@@ -81,7 +81,7 @@ def run(arguments: argparse.Namespace) -> int:
 def rig_of(robot: Robot, marker: str, settings: CameraSettings) -> Rig:
     """Return the robot with its first two cameras and a visual tag fixed at `marker`, as calibration needs them.
 
-    `marker`: name of a marker (named point of a link). `settings`: settings of the cameras, of which the lens is used. Raises MobeeError if
+    `marker`: name of a marker (named point of a link). `settings`: settings of the cameras; only their lens is used. Raises MobeeError if
     the robot has fewer than two cameras or no such marker.
     """
     cameras = cameras_of(robot)

@@ -53,7 +53,8 @@ FIRST_PICTURE = 15.0  # s for the first picture
 class Shot(NamedTuple):
     """The pictures of all cameras at one time.
 
-    `cameras`: state of each camera; `images`: picture of each camera; both by the name of the camera.
+    `images`: picture of each camera. `cameras`: the `Camera` message of each picture, with the lens and the encoder values at that time.
+    Keys of both: names of the cameras.
     """
 
     cameras: dict[str, Camera]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Connects a verb to the running system."""
+"""Connects a subcommand of `mobee` to the running system."""
 
 from __future__ import annotations
 

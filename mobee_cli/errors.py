@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The error that a verb raises if its user must change something, or if the machine has a fault."""
+"""The error that ends a subcommand of `mobee` if its input is wrong, its task fails, or the machine has a fault."""
 
 from __future__ import annotations
 

@@ -141,9 +141,9 @@ def written_whole(file: Path) -> Iterator[Path]:
 
 
 def write_reaches(file: Path, folder: Path) -> int:
-    """Write a CSV file of all reaches from which agents have learned, with one line for each step; return the number of lines.
+    """Write the attempts of agents to reach targets as CSV, with one line for each step of an attempt; return the number of lines.
 
-    Raises MobeeError if the run has no such reaches.
+    `folder`: the folder of the run, which has the recorded attempts. Raises MobeeError if it has none.
     """
     rows = 0
     with written_whole(file) as unfinished, unfinished.open("w", newline="") as sink:

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mobee keys`: makes the keys of a secured system (new, add), and lists all identities and how long they are valid (list)."""
+"""`mobee keys`: makes the identities of a secured system (new, add), and lists them with the ends of their validity (list).
+
+An identity is a private key and a certificate, for a service, another program or a person.
+"""
 
 from __future__ import annotations
 

@@ -101,10 +101,14 @@ frame, or None if it is not known."""
 
 
 def choose_hand(robot: Robot, position: Array | None, part: str | None, marker: str | None) -> Hand:
-    """Return the hand that reaches for a target. If `part` or `marker` is None, it is chosen by the target and the robot.
+    """Return the hand that reaches for a target.
+
+    If only `part` is given, the marker is the palm that the part moves, or else the end of its chain (`hand_of`). If only `marker` is
+    given, the part is the one with the most motors that move it. If both are None, the marker is that palm or chain end which is nearest to
+    the target in the home posture (`hand_for`). If both are given, the marker is not checked.
 
     `position`: position of the target, (3,) m in the root frame; None: not known. Raises UnknownName for a part or marker that the robot
-    does not have, InvalidValue if no motor moves the marker.
+    does not have, InvalidValue if no motor moves the marker or the part moves no marker.
     """
     if part is not None:
         robot.part(part)
@@ -118,7 +122,7 @@ def choose_hand(robot: Robot, position: Array | None, part: str | None, marker: 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Setup:
-    """The plant on which a hand reaches, offline or live.
+    """A robot, its plant (offline or live) and the hand that reaches.
 
     `hand`: the marker and the part that reach. `q`: measures the positions of all motors, (n,) rad. `present_object(name, aim, faces)`:
     makes an object of the plant's world the target and returns the target; `aim`: reach its "centre" or "surface"; `faces`: whether the
@@ -143,7 +147,8 @@ class Setup:
 def offline(robot: Robot, world: World, choose: Choose, target: Array | str) -> Iterator[Setup]:
     """Set up the offline plant with the robot at home in a world, for the block of a `with` statement.
 
-    `choose`: chooses the hand. `target`: a position (3,) m in the root frame, or the name of an object in the world.
+    `choose(robot, position)`: function that returns the hand for a target at `position`, (3,) m; None: not known. `target`: a position (3,)
+    m in the root frame, or the name of an object in the world.
     """
     known = {name: found.position for name, found in world.objects.items()}
     hand = choose(robot, known.get(target) if isinstance(target, str) else target)

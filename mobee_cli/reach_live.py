@@ -85,8 +85,8 @@ class LivePlant(BusPlant):
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
         """Pull a marker by a force to the target that was presented last, and return the outcome.
 
-        Afterwards the attractor pulls the part back, or, with `stay`, the part stays where the force ended. Raises UserError if this takes
-        longer than REACH_TIMEOUT (300 s).
+        When the force ends, the part returns to the attractor (goal of its motors) that it had before. With `stay`, the part stays where
+        the force ended. Raises UserError if the reach takes longer than REACH_TIMEOUT (300 s).
         """
         self._asked, self._heard, self._begun = time.monotonic(), np.inf, np.inf
         with self._timeout(REACH_TIMEOUT, f"{part} {_TIMED_OUT}"):
@@ -125,10 +125,10 @@ class LivePlant(BusPlant):
 
 
 def first_moving_command(commands: list[tuple[float, Array]], begun: float, moves: float) -> float | None:
-    """Return the time at which the first command was sent that begins to move the robot; None if there is none.
+    """Return the time [s] of the first command that moves the robot; None if there is no such command, or no command before `begun`.
 
-    `commands`: (time sent [s], values (n_part,)), in order. `begun`: time [s] of the reach, by the same clock. `moves`: least difference
-    from the last command before `begun`, in the unit of the values.
+    A command moves the robot if one of its values differs by more than `moves` from the last command before `begun`. `commands`: (time sent
+    [s], values (n_part,)), in order. `begun`: time at which the reach began [s], by the same clock. `moves`: in the unit of the values.
     """
     before = [ref for sent, ref in commands if sent < begun]
     moving = (sent for sent, ref in commands if sent >= begun and before and np.abs(ref - before[-1]).max() > moves)
@@ -137,9 +137,11 @@ def first_moving_command(commands: list[tuple[float, Array]], begun: float, move
 
 @contextmanager
 def live(endpoint: str, choose: Choose, target: Array | str) -> Iterator[Setup]:
-    """Set up the robot of the system at `endpoint`, for the block of a `with` statement. At its end the part that reaches is released.
+    """Set up the robot of the system at `endpoint` for a reach, for the block of a `with` statement.
 
-    `choose`: chooses the hand. `target`: a position (3,) m in the root frame, or the name of an object. Raises UserError if no system runs.
+    If the block ends without an error, the goal of the part is then released, and the target is removed. `choose(robot, position)`:
+    function that returns the hand for a target at `position`, (3,) m; None: not known. `target`: a position (3,) m in the root frame, or
+    the name of an object in the model's world. Raises UserError if no system runs.
     """
     with connected(endpoint) as session:
         try:

@@ -21,12 +21,13 @@ _COLUMNS = 80
 class Result:
     """The result of a reach.
 
-    `part`, `marker`: names of the part and of the marker that have reached. `why`: how they were chosen; empty if the user gave them.
-    `target`: the target. `outcome`: outcome of the reach, as the plant reports it. `nearest`: the position nearest to the target that the
-    marker can reach. `reward`: reward of the reach. `expected`: the reward that the agent expected; None without an agent. `first_motion`:
-    time from the request to the first command that moves the robot [s]; None offline. `angle`: angle [rad] between the marker's normal and
-    the direction to the target at the end; None if the marker need not face the target. `path`: states to which the agent moved before the
-    reach; empty without an agent. `avoided`: transitions (state, goal) that were expected to fail.
+    `part`, `marker`: names of the part that moved and of the marker that it brought to the target. `why`: how they were chosen; empty if
+    the user gave them. `target`: the target. `outcome`: outcome of the reach, as the plant reports it. `nearest`: the posture that brings
+    the marker nearest to the target, if contacts are ignored. `reward`: reward of the reach. `first_motion`: time from the request to the
+    first command that moves the robot [s]; None offline, or without such a command. `angle`: angle [rad] between the marker's normal and
+    the direction to the target at the end; None if the marker need not face the target. `path`: states of the agent before the reach, from
+    its first state to the one in which the reach began; empty without an agent. `avoided`: transitions (state, goal) that were expected to
+    fail. `expected`: the reward that the agent expected; None without an agent.
     """
 
     part: str
@@ -54,16 +55,17 @@ class Result:
 
     @property
     def beyond(self) -> float:
-        """The distance from the target's surface to the nearest position that the marker can reach [m]; 0 if this is inside the target."""
+        """The distance from the target's surface to the nearest position that the marker can reach [m]; 0 if that is inside the target."""
         return max(self.nearest.distance - self.target.radius, 0.0)
 
     def as_json(self) -> dict[str, Any]:
         """Return the result as plain JSON data. Lengths are in m, angles in rad, times in s.
 
-        "error": remaining distance to the aim, the centre or the surface of the target. "from_surface": distance from its surface.
-        "position": of the marker at the end. "nearest": position nearest to the target that the marker can reach, and its distance.
-        "avoided": transitions that were expected to fail. "settled": False if the part timed out. The other keys have the meaning of the
-        attributes of this class and of `outcome`.
+        "error": distance of the marker at the end from the centre or from the surface of the target, as the target's `aim` says.
+        "from_surface": its distance from the surface, 0 inside. "position": position of the marker at the end. "nearest": position nearest
+        to the target that the marker can reach, and its distance from the target's centre. "expected_reward": the attribute `expected`.
+        "settled", "touched" and "duration" are explained at `ReachOutcome`. The other keys are the attributes of this class with these
+        names.
         """
         outcome = self.outcome
         return {

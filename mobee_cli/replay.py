@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mobee replay`: plays a run again on its page or into its controller or model, or compares it with another run."""
+"""`mobee replay`: shows a run again, or runs its controller or model again on the recorded input, or compares two runs."""
 
 from __future__ import annotations
 

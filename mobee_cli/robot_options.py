@@ -110,10 +110,10 @@ def given_options(arguments: argparse.Namespace, names: Sequence[str] = ("robot"
 
 
 def require_none(arguments: argparse.Namespace, why: str, names: Sequence[str] = ("robot", "world")) -> None:
-    """Raise UserError for the first option for robot, world or URDF files that the user has given, because the verb cannot use it.
+    """Raise UserError if the user has given an option for the robot, the world or URDF files. Verbs that cannot use these options call it.
 
-    `why`: why the verb cannot use it; this text follows the option in the error. `names`: which of the options --robot and --world to
-    refuse; options for URDF files are always refused.
+    `why`: why the verb cannot use them. The error contains the first such option, then this text. `names`: which of the options --robot and
+    --world to refuse; options for URDF files are always refused.
     """
     for option in given_options(arguments, names):
         raise UserError(f"{option}: {why}", BAD_INPUT)

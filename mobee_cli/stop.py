@@ -26,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run `mobee stop`: ask the launcher to end everything, wait until it has ended, and return the exit code.
 
-    Without a launcher, ask every service and then the router.
+    If there is no launcher, ask every service, and then the router, to end.
     """
     with connected(arguments.endpoint) as session:
         present = alive(session)

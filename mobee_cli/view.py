@@ -62,8 +62,8 @@ def show(robot: Robot, world: World | None, save: Path | None, stretches: Sequen
     """Show the robot in motion on a page until Ctrl-C, or save the motion to a file; return the exit code.
 
     `world`: objects around the robot. `save`: file to write; None: show a page. `stretches`: sections of the motion, each a
-    `services.monitor.viewer.view.Stretch`; None: every motor through its range. `solids`: show the solids (volumes by which contacts are
-    found) instead of the visuals (surfaces in the robot file).
+    `services.monitor.viewer.view.Stretch`; None: all motors move through their ranges. `solids`: show the solids (volumes by which contacts
+    are found) instead of the visuals (surfaces in the robot file).
     """
     try:
         from services.monitor.viewer.view import view  # needs the viewer, which is an extra

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The place of the packages `services`, `bus_schema`, `experiments` and `mobee_cli`, which make the live system and the command `mobee`.
+"""Makes the packages of the live system and of the command `mobee` importable: `services`, `bus_schema`, `experiments` and `mobee_cli`.
 
 A wheel installs these four packages inside this folder, so that site-packages holds no package of such a general name as `services`.
-In a clone of the repository they stand beside this folder.  Importing this module puts their place first in `sys.path`; after that,
-`import services` finds MoBeE's package, also where the working directory has a folder of that name.  A script of yours that uses the
-bus begins with::
+In a clone of the repository they stand beside this folder.  Importing this module puts the folder that contains them first in `sys.path`;
+after that, `import services` finds MoBeE's package, also where the working directory has a folder of that name.  A script of yours that
+uses the bus begins with::
 
     import mobee_system
     from services.common.service import Service

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Run a module of the system: `python -m mobee_system.run services.model --help`.
 
-As `python -m services.model --help`, but it also works in a folder that has a package `services` of its own.
+The command does the same as `python -m services.model --help`. It also works in a folder that has a package `services` of its own.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import sys
 
 
 def main() -> None:
-    """Run the module that the first argument names as `__main__`, with the arguments that follow."""
+    """Run a module as the main program (`__main__`). The first argument is the module's name, the others are arguments for the module."""
     if len(sys.argv) < 2:
         sys.exit("usage: python -m mobee_system.run MODULE [arguments]")
     del sys.argv[0]

@@ -2,9 +2,9 @@
 """Compares the processor time of the same work in two checkouts of this repository.
 
 A case is a piece of work with a name, in against_cases.py.  It is measured in rounds.  In each round every checkout runs in a fresh
-process.  Both prepare the case and do its work once without timing; then they do it by turns (old, new, new, old, ...).  Only processor
-time is counted, so other programs on the machine matter little.  The ratio of a round is the sum of the old times over the sum of the new
-times.  The verdict rests on the median ratio of the rounds.
+process.  Both prepare the case and do its work once without timing; then they do it by turns (old, new, new, old, ...).  The
+times are processor times, not real times, so other programs on the machine have little influence.  The ratio of a round is the sum of the
+old times over the sum of the new times.  The median ratio over the rounds decides whether the new checkout passes.
 """
 
 from __future__ import annotations
@@ -178,11 +178,12 @@ def measure(settings: Settings) -> dict[str, Any]:
 
 
 def measure_checkouts(old: Checkout, new: Checkout, cases: Sequence[str], rounds: int) -> dict[str, Any]:
-    """Measure the cases in two checkouts by turns and return the result; raises AgainstFailed.
+    """Measure the cases in two checkouts and return the result; raises AgainstFailed.
 
-    `cases`: names in `against_cases.CASES`.  Keys: "rounds", their number; "cases", a dict from the name of each case to the times of both
-    checkouts and their ratio, as `compared` returns them; "requirements", a list with a dict for each case, as `Requirement.judge` returns
-    it: the new checkout must not be slower than the old one (ratio at least 0.97); "passed", whether all are met.
+    `cases`: names in `against_cases.CASES`.  `rounds`: number of rounds of each case.  Keys: "rounds", this number; "cases", a dict from
+    the name of each case to the times of both checkouts and their ratio, as `compared` returns them; "requirements", a list with a dict for
+    each case, as `Requirement.judge` returns it; "passed", whether all requirements are met.  The requirement of a case is that the ratio
+    of the old time to the new one is at least 0.97.
     """
     pairs: dict[str, list[Pair]] = {case: [] for case in cases}
     with Progress() as progress:
@@ -213,9 +214,10 @@ def _round(old: Checkout, new: Checkout, case: str, turns: int) -> Pair:
 def compared(rounds: Sequence[Pair]) -> dict[str, Any]:
     """Return the statistics of one case over its rounds.
 
-    `rounds`: for each round, under "old" and "new", the "seconds" of the work [s] and "work", counts of the work done.  Keys: "old_s" and
-    "new_s", median times [s]; "ratio", the median of the old time over the new one; "quartiles" and "range" of this ratio, two numbers
-    each; "work", counts of the work of each checkout in the last round; "same_work", whether these counts are equal.
+    `rounds`: for each round a dict with the keys "old" and "new".  Each value is a dict with "seconds", the mean processor time of one run
+    of the work [s], and "work", a dict of numbers that say what was done, by which the work of two checkouts is compared.  Keys of the
+    result: "old_s" and "new_s", median times [s]; "ratio", the median of the old time over the new one; "quartiles" and "range" of this
+    ratio, two numbers each; "work", the "work" of each checkout in the last round; "same_work", whether the two are equal.
     """
     old, new = (np.array([one[which]["seconds"] for one in rounds]) for which in ("old", "new"))
     ratios = old / new

@@ -3,9 +3,9 @@
 
     PYTHONPATH=CHECKOUT python -P against_cases.py CASE
 
-Checkouts back to commit 10a73fe can be measured: modules that have moved since then are imported by `_first`.  The process prepares the
-case and does its work once to warm up.  Then it does the work again for every line of its standard input.  Each time it prints a line of
-JSON with the processor time and counts of the work, which show whether two checkouts did the same work.
+Checkouts back to commit 10a73fe can be measured: `_first` finds modules that had another name then.  The process prepares the case and does
+its work once to warm up.  Then it does the work again for every line of its standard input.  Each time it prints a line of JSON with the
+processor time and the counts of the work.  If the counts of two checkouts are equal, both did the same work.
 """
 
 from __future__ import annotations

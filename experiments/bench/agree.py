@@ -50,8 +50,8 @@ class Agreement:
     """Comparison of a live run and an offline run of equal agents, over the actions that occur in both runs.
 
     `actions`: number of compared actions.  `worst`: largest difference of a motor's position at the end of an action [rad].  `same`:
-    whether states, ticks, settling and touched objects are equal.  `first_difference`: the first action in which these differ, as text; ""
-    without one.
+    whether states, actions, numbers of ticks and touched objects are equal, and the same actions timed out.  `first_difference`: text about
+    the first action in which these differ; "" if all are equal.
     """
 
     actions: int
@@ -77,7 +77,7 @@ def lockstep(ticks: int, seed: int, folder: Path) -> tuple[dict[str, list[Transi
 
 
 def offline(actions: int, seed: int, folder: Path) -> dict[str, list[Transition]]:
-    """Run the same three agents on the offline plant for `actions` actions in all.
+    """Run three agents, with the settings of those in `lockstep`, on the offline plant for `actions` actions in all.
 
     Returns a dict from the name of a part to its transitions.  The file of the transitions is in `folder`.  `seed`: of plant and agents.
     """
@@ -95,7 +95,7 @@ def offline(actions: int, seed: int, folder: Path) -> dict[str, list[Transition]
 
 
 def compare(live: Observed, plant: Observed) -> Agreement:
-    """Compare the actions of a live and an offline run: for each part in order of time, as far as both runs have actions.
+    """Compare the n-th action of each part in a live run with its n-th action in an offline run, for all n that both runs have.
 
     `live`, `plant`: the transitions of both runs, by the name of the part.
     """

@@ -3,8 +3,9 @@
 
 If two volumes overlap by less than MIN_OVERLAP, two programs may differ on whether they touch.  A depth is *right* if it is the distance
 that the first volume must move along the normal until a plane separates the two.  It is *minimal* if no peer gives a direction in which a
-shorter motion separates the volumes.  `separation` computes this distance for any direction.  Therefore a peer can be used even if its own
-depths are not minimal, as those of MuJoCo's contact points, and those that coal and fcl find for cylinders by iterative searches.
+shorter motion separates the volumes.  `separation` computes this distance for any direction.  Therefore the model can be compared with
+peers whose own depths are not minimal: MuJoCo's depths of contact points, and the depths that coal and fcl find for cylinders by iterative
+searches.
 """
 
 from __future__ import annotations
@@ -45,9 +46,8 @@ class Agreement:
     `contacts`: number of the model's contacts.  `other_pairs`: number of contacts that only one of the two programs finds; `deepest_other`:
     depth of the deepest such contact [m], 0 if there is none.  `depth_difference`: largest difference between the depths of both programs
     [m], by kinds of volumes ("box-capsule").  `same_depths`: share of the contacts whose depths differ by at most DEPTH_TOLERANCE (1e-9 m).
-    `beaten`: the model's depth of a contact should be the shortest motion that separates the two volumes; if the motion along the peer's
-    normal is shorter for some contacts, the largest difference of the two [m], else 0.  `passed`: whether all differences are within their
-    tolerances.
+    `beaten`: largest amount [m] by which the model's depth exceeds the motion along the peer's normal that separates the volumes; 0 if it
+    never does (the model's depth should be minimal).  `passed`: whether all differences are within their tolerances.
     """
 
     peer: str
@@ -95,8 +95,8 @@ class ModelContacts:
     def depth_error(self) -> float:
         """Return the largest error [m] of the model's depths, over all contacts in all poses; 0 if there is no contact.
 
-        The error of a depth is its absolute difference from the distance that the first volume must move along the contact's normal to
-        leave the second one, as the method `separation` computes it.
+        For each contact, the method `separation` computes how far the first volume must move along the contact's normal to leave the second
+        one.  The error is the absolute difference between this distance and the depth.
         """
         return max(
             (
@@ -131,8 +131,8 @@ def compared(peer: str, scene: Scene, ours: ModelContacts, detect: Detect) -> Ag
     """Compare the contacts `ours` of the model with those of the peer.
 
     `detect`: function that takes the index of a pose and returns the peer's contacts: pairs (c, 2) of indices in `ours.volumes`, depths
-    (c,) m, and unit vectors (c, 3), root frame, along which the first volume moves out of the second.  The depth of a contact is not
-    compared if the peer does not compute it.
+    (c,) m, and unit vectors (c, 3), root frame, along which the first volume moves out of the second.  A contact's depth is not compared if
+    the peer has not computed it: if its absolute value is at least UNKNOWN_DEPTH (1000 m), or the unit vector is not finite.
     """
     other: list[float] = []
     differences: dict[str, list[float]] = defaultdict(list)

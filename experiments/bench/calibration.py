@@ -4,7 +4,8 @@
 It consists of three parts of equal time: Python (calls, a dictionary, floating point numbers), NumPy with arrays of a few numbers, and
 NumPy with arrays of thousands, as in most numerical programs.  The *standard machine* does the loop in STANDARD_SECONDS.  A time that is
 measured here, multiplied by the speed of this machine at that moment, is the time on the standard machine.  Verdicts rest on that time, so
-they are the same on a machine three times slower, and while other programs use this one.  Bare times are printed without a verdict.
+they are the same on a machine three times slower, and while other programs use this one.  Times that are not converted are printed, but not
+judged.
 
 For work of several processes at once there is a `Crew`: helper processes that do the same loop.
 """
@@ -146,8 +147,8 @@ class Crew:
     def loops(self, count: int = 3) -> float:
         """Return the speed of this machine while all helpers do the calibration loop at the same time.
 
-        It is in multiples of the speed of the standard machine, the one for which the requirements were set: STANDARD_SECONDS (0.01 s) over
-        the median wall time of `count` measurements, in each of which every helper does one loop.
+        In each of `count` measurements every helper does one loop.  The result is STANDARD_SECONDS (0.01 s) divided by the median wall
+        time.  It is a multiple of the speed of the standard machine, the one for which the requirements were set.
         """
         return STANDARD_SECONDS / self._request(_LOOP, 1, count)
 
@@ -155,8 +156,8 @@ class Crew:
         """Return the speed of this machine while processes exchange messages, in multiples of the standard machine's speed.
 
         The standard machine is the one for which the requirements were set.  In a measurement, this process sends 50 messages to all
-        helpers, the next one when all have answered the last; for each message a helper does a portion (1/50) of the calibration loop and
-        answers.  The speed is STANDARD_EXCHANGE_SECONDS (0.016 s) over the median wall time of `count` measurements.
+        helpers.  For each message a helper does a portion (1/50) of the calibration loop and answers; when all helpers have answered, the
+        next message is sent.  The speed is STANDARD_EXCHANGE_SECONDS (0.016 s) over the median wall time of `count` measurements.
         """
         return STANDARD_EXCHANGE_SECONDS / self._request(_PORTION, PORTIONS, count)
 

@@ -48,9 +48,10 @@ PLAN_STYLES = {  # colour, line
 class CostFigure:
     """The functions that measure and draw one figure of costs, and its layout.
 
-    `measure`: function of `quick` and `rounds` that measures and returns the curves, {curve: {size: {name: cost}}}.  `draw`: function that
-    draws the curves on two Matplotlib axes, left and right.  `height`: height of the figure, inches.  `share_y`: whether both axes have the
-    same y axis.
+    `measure`: function that measures and returns the curves, with the arguments `quick` and `rounds` of `write`.  It returns {curve: {size:
+    {name: cost}}}: size is the value on the horizontal axis (as a number of boxes), name is a program or a unit of cost.  `draw`: function
+    that draws the curves on two Matplotlib axes, left and right.  `height`: height of the figure, inches.  `share_y`: whether both axes
+    have the same y axis.
     """
 
     measure: Callable[..., Curves]
@@ -165,10 +166,10 @@ def draw_plant_costs(left: Any, right: Any, curves: Mapping[str, Any]) -> None:
 
 
 def plan_costs(quick: bool, rounds: int | None = None) -> Curves:
-    """Measure the processor time of a plan (solving an MDP) with all solvers, for several numbers of states and discounts.
+    """Measure the processor time of solving an MDP (a plan) with each solver, for several numbers of states and several discount factors.
 
-    Returns {"states" or "discount": {size: {solver: median processor time [us] per plan}}}.  `rounds` is not used.  Raises NotInstalled
-    without quantecon.
+    Returns {"states" or "discount": {size: {solver: median processor time [us] per plan}}}.  `quick`: only up to 10 000 states.  `rounds`
+    is not used.  Raises NotInstalled without quantecon.
     """
     curves: Curves = {"states": {}, "discount": {}}
     known = vi.after_transitions(1000, 50)

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A live system under schedules of faults: time until parts hold, time until all are back, and lost or mixed transitions.
+"""A live system under schedules of faults: time until parts hold, time until all follow commands again, and lost or changed transitions.
 
-Claim: after a process is killed the parts that depend on it hold within 30 ms, after it freezes within 120 ms (95 of 100, on a machine that
-does nothing else); every part follows commands again within 5 s of the last fault; no transition is lost, stored twice or stored with other
-values; no motor is faster than the gate allows, and none obeys a command that answers a tick of more than 100 ms ago.  The number of a
-schedule is the seed with which it is drawn; all schedules are performed on one running system.  If a schedule breaks a guarantee, faults
-can be removed from it while a guarantee is still broken (`shrink`).  Times are judged only in real time and if the load was low; the load
-is part of the result.  If there is a quiet period before the schedules: under faults the agents make at least four fifths as many
-transitions a second as in this period.  Run time: about 10 s for each schedule.
+Claim: the parts of the robot that depend on a process hold (brake and stand still) within 30 ms after it is killed, and within 120 ms after
+it freezes, in 95 of 100 cases, on a machine that does nothing else; every part follows commands again within 5 s of the last fault; no
+transition is lost, stored twice or stored with other values; no motor is faster than the gate allows, and none obeys a command that answers
+a tick of more than 100 ms ago.  The number of a schedule is the seed with which it is drawn; all schedules are performed on one running
+system.  If a schedule breaks a guarantee, faults can be removed from it while a guarantee is still broken (`shrink`).  Times are judged
+only in real time and if the load was low; the load is part of the result.  If there is a quiet period before the schedules: under faults
+the agents make at least four fifths as many transitions a second as in this period.  Run time: about 10 s for each schedule.
 """
 
 from __future__ import annotations
@@ -50,9 +50,10 @@ class Settings:
     """Settings of the benchmark.
 
     `schedules`: number of schedules of faults.  `seed`: seed of the first schedule; each next one has the next seed.  `seconds`: duration
-    of each schedule [s].  `period`: mean time between two faults [s].  `shrink`: maximum number of times that a schedule which breaks a
-    guarantee is performed to shorten it; 0: it is not shortened.  `scenario`: scenario of the system.  `quiet`: time without faults [s]
-    before the first schedule, to compare the transitions a second with those under faults; 0: no comparison.
+    of each schedule [s].  `period`: mean time between two faults [s].  `shrink`: if a schedule breaks a guarantee, up to `shrink` schedules
+    with fewer of its faults are performed, to find a shorter one that breaks a guarantee; 0: none.  `scenario`: scenario of the system.
+    `quiet`: time without faults [s] before the first schedule, to compare the transitions a second with those under faults; 0: no
+    comparison.
     """
 
     schedules: int = 20
@@ -148,15 +149,16 @@ def _alone(schedule: Sequence[Fault], times: Sequence[float]) -> Iterator[tuple[
 def measure(settings: Settings) -> dict[str, Any]:
     """Perform the schedules on one system and return the result; raises LaunchFailed if the system does not start or ends early.
 
-    A schedule is a sequence of faults, such as a process that is killed.
+    A schedule is a sequence of faults, such as a process that is killed.  A part of the robot *holds* if it brakes and stands still.
 
     Main keys: "hold_ms", a dict from the kind of fault ("kill" or "freeze") to statistics of the times from a fault until a part holds
     [ms]; "back_s", the statistics of the times from the end of a schedule's last fault until all parts follow commands again [s];
-    statistics are dicts with the keys "count", "p50" and "p95" (percentiles), and "max"; "transitions", dict with the numbers of "kept",
-    "lost" and "differing" ones on disk, and of "gaps" (numbers that occur twice on disk); "broken", list of the broken guarantees as text;
-    "rows", a list with the dict of the measurements of each schedule; "passed", whether no guarantee is broken, all parts held, no
-    transition is lost or differs, faults cost at most a fifth of the transitions (if that was measured), and the times are short enough.
-    If the machine was busy, or the robot ran in lockstep, times do not count.
+    statistics are dicts with the keys "count", "p50" and "p95" (percentiles), and "max"; "transitions", dict with numbers of transitions:
+    "kept" (on disk), "lost" (published, but not on disk), "differing" (with other values than published) and "gaps" (on disk twice, under
+    one number); "broken", list of the broken guarantees as text; "rows", a list with the dict of the measurements of each schedule;
+    "passed", whether no guarantee is broken, all parts that had to hold did so, no transition is lost, differs or is stored twice, faults
+    cost at most a fifth of the transitions (if that was measured), and the times are short enough.  If the machine was busy, or the robot
+    ran in lockstep, times do not count.
     """
     rows: list[dict[str, Any]] = []
     with Progress() as progress, tempfile.TemporaryDirectory() as scratch, running(Path(scratch), settings.scenario) as system:

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Nearly valid messages, calls and tokens, sent to a live system by `kit.live.malformed`: which processes end, and how memory grows.
+"""Nearly valid messages, calls and liveliness tokens (of Zenoh), sent to a live system: which processes end, and how memory grows.
 
-Claim: no process ends, none is ended by the launcher, the memory of each has grown by less than 20 MB when the queues are empty again, and
-afterwards every agent makes transitions.  The robot moves by the motor model at 100 Hz, with its three agents; no monitor runs.  Messages
-are not dropped: a service that does not read fast enough delays the sender.  Run time: some minutes for a million on 2 cores.
+Claim: no process ends by itself or is ended by the launcher; 15 s after the last message the memory of each has grown by less than 20 MB;
+afterwards every agent makes transitions.  The robot moves by the motor model at 100 Hz, with its three agents; no monitor runs.
+`experiments.kit.live.malformed` draws and sends the messages.  They are not dropped: a service that does not read fast enough delays the
+sender.  Run time: some minutes for a million on 2 cores.
 """
 
 from __future__ import annotations
@@ -53,12 +54,12 @@ QUICK = Settings(messages=40_000)
 
 
 def measure(settings: Settings) -> dict[str, Any]:
-    """Send all messages, which are nearly valid, and return the result; raises LaunchFailed if the system fails.
+    """Send nearly valid messages, calls and liveliness tokens to a live system and return the result; raises LaunchFailed if it fails.
 
     Main keys: "sent", dict of the numbers of sent "messages", "calls" and "tokens"; "refused", dict from a process to the number of
-    messages that it refused; "grown_mb" and "largest_growth_mb", dicts from a process to the growth of its memory [MB], at the end and at
-    its largest; "ended", list of the processes that ended; "learned", list of the agents that made a transition afterwards; "passed",
-    whether no process ended, no memory grew too much, and all agents learned.
+    messages that it refused; "grown_mb", dict from a process to the growth of its memory at the end [MB]; "largest_growth_mb", the same for
+    the largest growth during the run; "ended", list of the processes that ended; "learned", list of the agents that made a transition
+    afterwards; "passed", whether no process ended, no memory grew too much, and all agents learned.
     """
     sent: Counter[str] = Counter()
     begun = time.monotonic()

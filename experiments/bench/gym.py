@@ -37,7 +37,10 @@ REQUIREMENTS = (
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Settings of the benchmark.  `steps`: steps of each environment in a round.  `rounds`: number of rounds; the median counts."""
+    """Settings of the benchmark.
+
+    `steps`: steps of each environment in a round.  `rounds`: number of rounds, of which the median is reported.
+    """
 
     steps: int = 500
     rounds: int = 7  # the median counts
@@ -71,8 +74,8 @@ class Player:
 def players(steps: int) -> dict[str, Player]:
     """Return a dict from the name of each environment (a key of UNITS) to a player.
 
-    `steps`: number of steps of each player in a run; the batch of Reach-v0 makes four times as many.  Raises NotInstalled without
-    Gymnasium, MuJoCo or imageio.
+    `steps`: number of steps of each player in a run, summed over the environments of a vector; the vector of Reach-v0 makes four times as
+    many.  Raises NotInstalled without Gymnasium, MuJoCo or imageio.
     """
     gymnasium = import_peer("gymnasium", "Gymnasium")
     for package, name in (("mujoco", "MuJoCo"), ("imageio", "imageio, which Gymnasium's MuJoCo environments import")):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Inverse kinematics: how often and how fast solvers bring the palm among boxes to a target: the library's, mink and the thesis' rivals."""
+"""Inverse kinematics of a palm among boxes: how often and how fast the library, mink and the thesis' rivals reach a target pose."""
 
 from __future__ import annotations
 
@@ -70,9 +70,9 @@ QUICK = Settings(targets=20, whole=5, rivals=5)
 def measure(settings: Settings) -> dict[str, Any]:
     """Run this benchmark and return its result; raises NotInstalled without cma, mink or MuJoCo.
 
-    Main keys: "rows", a dict from the name of a solver to its statistics, as `Tries.row` returns them, with "times_cma", the median time of
-    CMA-ES (pose by pose) over that of the solver; "requirements", a list with the dict that `Requirement.judge` returns for each
-    requirement; "passed", whether all are met.
+    Main keys: "rows", a dict from the name of a solver to its statistics, as `Tries.row` returns them, and "times_cma", the median time of
+    the CMA-ES that evaluates pose by pose, divided by that of the solver; "requirements", a list with the dict that `Requirement.judge`
+    returns for each requirement; "passed", whether all are met.
     """
     load_cma()
     load_mink()
@@ -120,7 +120,10 @@ def _three_digits(value: float) -> str:
 
 
 def scene() -> mobee.Model:
-    """Return a model of the iCub among BOXES (100) boxes: the first boxes of the model's benchmark that do not touch the robot at home."""
+    """Return a model of the iCub among BOXES (100) boxes.
+
+    They are the first boxes of `boxes_world` that do not touch the robot at home.
+    """
     robot, world = mobee.load_robot("icub"), mobee.World()
     model = mobee.Model(robot, world)
     candidates = boxes_world(1000).snapshot.objects
@@ -212,10 +215,10 @@ def timed(solve: Solve, aim: Target, seed: int) -> tuple[bool, int, float]:
 
 @dataclass(slots=True)
 class Tries:
-    """What a solver needed for each of its targets, in order, whether it found a pose or not.
+    """Results of a solver for each of its targets, in the order of the targets, also of those that it did not reach.
 
-    `reached`: whether it found a pose.  `evaluations`: number of evaluated poses.  `ms`: processor time [ms].  `standard_ms`: the same on
-    the standard machine (the one for which the requirements were set).
+    `reached`: whether it found a pose within the tolerances.  `evaluations`: number of evaluated poses.  `ms`: processor time [ms].
+    `standard_ms`: the same on the standard machine (the one for which the requirements were set).
     """
 
     reached: list[bool] = field(default_factory=list)

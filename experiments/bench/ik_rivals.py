@@ -56,7 +56,7 @@ class Target:
     radians: float = float(np.deg2rad(5.0))
 
     def costs(self) -> list[Term]:
-        """Return the costs of a pose of the robot: position and orientation within the tolerances, no contact, and distance from home."""
+        """Return the cost terms of a pose: errors of the palm's position and orientation, depths of contacts, and distance from home."""
         costs = mobee.costs
         return [
             costs.position(MARKER, self.position, self.metres),
@@ -185,7 +185,7 @@ def load_mink() -> Any:
 class MinkPeer:
     """The chain of joints from the base to the right palm as a model for mink, without collision volumes.
 
-    The `Problem` given to `solve` tests the poses that mink finds for contacts.
+    mink ignores contacts.  Therefore `solve` takes a `Problem`, which checks whether the robot has contacts in the poses that mink finds.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -198,8 +198,9 @@ class MinkPeer:
     def solve(self, problem: Problem, target: Target, seed: int, most: int) -> Array | None:
         """Return a pose (n,) rad within all tolerances, or None after `most` evaluations.
 
-        The starts are those of the library's least squares: first home, then by turns near home and anywhere.  Steps and contact checks
-        count as evaluations.  `seed`: of the random numbers.  `most`: largest number of evaluations.
+        It starts at home.  Each later start is alternately near home or uniform within the motors' limits, as in the library's least
+        squares.  Steps of mink and contact checks are counted as evaluations.  `problem`: the inverse kinematics problem, which tests
+        poses.  `target`: its target pose.  `seed`: of the random numbers.  `most`: largest number of evaluations.
         """
         rotation = self._mink.SO3.from_matrix(target.rotation)
         self._task.set_target(self._mink.SE3.from_rotation_and_translation(rotation, target.position))

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The live system in real time: jitter of the controller's period, and age of the command that the robot obeys, at several rates.
 
-Claim: on two cores the age is at most 2 ticks in 99 of 100 ticks up to 200 Hz, 3 up to 500 Hz and 5 at 1 kHz.  The age is the number of
-ticks since the tick that the command answers.  Age and jitter are measured by the services; ticks in which a part holds are counted
-separately and have no age.  Before and after every run, a bare chain of processes that do a little each (calibration.py) measures the delay
-that the machine's scheduling causes.  If this delay is k times that of the standard machine, the allowed ages are k times larger.  Run
-time: `seconds` and a start for every rate, on a machine that does nothing else.
+Claim: on two cores the age is at most 2 ticks in 99 of 100 ticks up to 200 Hz, 3 up to 500 Hz and 5 at 1 kHz.  The age of a command is the
+number of ticks between the state from which it was computed and the tick in which the robot obeys it.  Age and jitter are measured by the
+services.  Ticks in which a part holds (brakes and stands still) are counted separately and have no age.  Before and after every run, a
+chain of processes that only do a little fixed work (`calibration.bare_ages`) measures the delay that the machine's scheduling causes.  If
+this delay is k times that of the standard machine, the allowed ages are k times larger.  Run time: `seconds` and a start for every rate, on
+a machine that does nothing else.
 """
 
 from __future__ import annotations
@@ -43,7 +44,8 @@ def measure(settings: Settings) -> dict[str, Any]:
     """Run the system at each tick rate and return the result; raises LaunchFailed if a system fails or does not end.
 
     Keys: "backend", of the simulated robot; "seconds", duration of each run [s]; "runs", a list with the dict that `judged_run` returns for
-    each rate; "passed", whether in all runs the ages of the commands are small enough.
+    each rate; "passed", whether the ages of the commands are small enough in all runs.  The age of a command is the number of ticks between
+    the state from which it was computed and the tick in which the robot obeys it.
     """
     runs = []
     with Progress() as progress:

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The live system in lockstep, in which ticks wait for all services: its speed on the motor model, on PyBullet and on MuJoCo.
 
-Claim: robot_sim, model, controller and three agents, each a process, simulate at least 15 s of robot time per second on the motor model and
-10 on PyBullet, at ticks of 20 ms, on the standard machine.  Before and after every run the speed of this machine is measured by processes
-that exchange messages and do a little work for each.  Run time: six runs of `seconds` each and their start.
+Claim: robot_sim, model, controller and three agents, each in its own process, simulate at least 15 s of robot time per second on the motor
+model and 10 s on PyBullet, at ticks of 20 ms, on the standard machine.  Before and after every run the speed of this machine is measured
+with helper processes (`Crew.exchanges`), which do a little work for each message and answer it.  Run time: six runs of `seconds` each and
+their start.
 """
 
 from __future__ import annotations

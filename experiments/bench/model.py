@@ -2,9 +2,9 @@
 """The egocentric model compared with MuJoCo and python-fcl: poses per second, and whether they find the same contacts.
 
 Claim: one compiled kernel makes the model of thesis chapter 2 the fastest of its kind, on the iCub and on robots of other makers
-(scenes.py).  Our model computes every contact with depth, normal and point, and the projected forces.  MuJoCo is timed while it computes
-forward kinematics and detects collisions, python-fcl while it computes whether each pair touches.
-Run time: about four minutes, a quarter with `--quick`.
+(scenes.py).  Our model computes every contact with depth, normal and point, and the projection of the contacts to the motors (the sum in
+thesis eq. 5.11).  MuJoCo is timed while it computes forward kinematics and detects collisions, python-fcl while it computes whether each
+pair touches.  Run time: about four minutes, a quarter with `--quick`.
 """
 
 from __future__ import annotations
@@ -136,14 +136,15 @@ def summarized(
 ) -> dict[str, Any]:
     """Return the medians of the rates and of their ratios to the peers' rates, and the verdict.
 
-    `measured`: the rates of all contestants, by the name of the robot and the number of objects around it.  `threads`: "gain", wall time of
-    a batch on one thread over that on two, and "processes", how many times as much fixed work two processes do as one; None if they were
-    not measured.  `depth_error`: the model's largest depth error [m].  `compared`: the comparisons of contacts with the peers.
+    `measured`: the rates of all contestants, by the name of the robot and the number of objects around it.  `threads`: a dict with "gain",
+    wall time of a batch on one thread divided by that on two threads, and "processes", work per second of two processes divided by that of
+    one process; None if this was not measured.  `depth_error`: the model's largest depth error [m].  `compared`: the comparisons of
+    contacts with the peers.
 
     Keys: "poses_per_second", "times_mujoco" and "times_python_fcl", for the iCub: each a dict from the number of objects to a dict from the
     contestant to the rate or ratio; "others", the same tables for each other robot; "requirements", a list with the dict that
-    `Requirement.judge` returns for each requirement; "passed", whether all are met and all comparisons have passed; "threads",
-    "depth_error", and "agreement", the last three arguments.
+    `Requirement.judge` returns for each requirement; "passed", whether all are met and all comparisons have passed; "threads" and
+    "depth_error", the arguments; "agreement", the argument `compared` as a list of dicts.
     """
 
     def tables(found: Mapping[int, Rates]) -> dict[str, Any]:
@@ -167,7 +168,8 @@ def summarized(
 def contestants(robot: Robot, boxes: int, poses: int) -> dict[str, Contestant]:
     """Return the programs to compare (ours, MuJoCo, python-fcl), by name; all have the same robot, world and poses.
 
-    `boxes`: number of boxes in the world.  `poses`: number of poses of a run of ours and of MuJoCo; python-fcl does fewer.
+    `boxes`: number of boxes in the world.  `poses`: number of poses in a run of our model and in a run of MuJoCo; a run of python-fcl has
+    fewer.
     """
     from experiments.bench.collision_peers import FclPairs, FclTrees  # raises NotInstalled without python-fcl
 

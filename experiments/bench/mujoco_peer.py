@@ -56,7 +56,7 @@ class MujocoPeer:
     def joint_angles(self, q: Array) -> Array:
         """Return MuJoCo's joint positions qpos (..., joints) rad for motor positions q (..., n) rad.
 
-        They are computed in advance, so that the conversion is not timed.
+        Callers convert all poses before the timing begins, so that the conversion is not timed.
         """
         matrix, offset = self._coupling
         order = np.argsort([self.model.joint(f"joint{index}").qposadr[0] for index in range(len(offset))])
@@ -79,7 +79,7 @@ class MujocoPeer:
 
         They are given as pairs (c, 2) of volumes, depths (c,) m, and unit vectors (c, 3), root frame.  Volumes are numbered: the robot's
         shapes come first, then the objects.  The smaller number of a pair is first, and the unit vector moves this volume out of the other.
-        The deepest contact point of a pair counts.
+        If MuJoCo finds several contact points for a pair, the deepest one is returned.
         """
         contact = self.data.contact
         volumes = self._volume[np.array(contact.geom).reshape(-1, 2)]

@@ -50,10 +50,11 @@ QUICK = Settings(dimensions=(10,), runs=3)
 def measure(settings: Settings) -> dict[str, Any]:
     """Run this benchmark and return its result; raises NotInstalled without cma.
 
-    Main keys: "rows", a list with a dict for each "function" and number of "dimensions": the median evaluations of each strategy under its
-    name, the processor time of the strategy itself per evaluation [us] under its name with the ending "_us", and the "ratio" of the
-    evaluations of NES to those of CMA-ES; "ratio", the median of these ratios; "requirements", a list with the dict that
-    `Requirement.judge` returns for each requirement; "passed", whether all are met.
+    Main keys: "rows", a list with a dict for each function and number of dimensions; "ratio", the median of the rows' ratios;
+    "requirements", a list with the dict that `Requirement.judge` returns for each requirement; "passed", whether all are met.
+
+    Keys of a row: "function" and "dimensions"; for each strategy, such as "nes": under its name the median number of evaluations, and under
+    its name with "_us" the strategy's own processor time per evaluation [us]; "ratio", evaluations of NES divided by those of CMA-ES.
     """
     load_cma()
     rows = [(name, d) for d in settings.dimensions for name in FUNCTIONS]

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A system on two hosts whose network is disturbed: how old the commands are that the robot obeys, when parts hold and move again.
+"""A system on two hosts whose network is disturbed: age of the commands that the robot obeys, times until its parts stop and move again.
 
-Claim: no command is obeyed that answers a tick of more than 100 ms ago by robot_sim's clock.  Parts hold if a cut separates them from their
-controller.  A part begins no new action if a cut separates it from its agent.  Every part moves again within 5 s after the network works
-again.  No transition is lost, stored twice or stored with other values.  No motor is faster than the gate allows.
+Claim: no command is obeyed that answers a tick of more than 100 ms ago by robot_sim's clock.  Parts of the robot hold (brake and stand
+still) if a cut separates them from their controller.  A part begins no new action if a cut separates it from its agent.  Every part moves
+again within 5 s after the network works again.  No transition is lost, stored twice or stored with other values.  No motor is faster than
+the gate allows.
 
-The hosts are network namespaces on this machine, with keys, and the monotonic clock of the second host is an hour ahead.  Packets are
-delayed, lost and reordered at random, with a seed.  Times are judged only if the load was low.  Run time: 3 minutes.
+The hosts are network namespaces on this machine.  Their connections are encrypted (TLS), with a key for each process.  The monotonic clock
+of the second host is an hour ahead.  Packets are delayed, lost and reordered at random, with a seed.  Times are judged only if the load was
+low.  Run time: 3 minutes.
 """
 
 from __future__ import annotations
@@ -100,10 +102,11 @@ def measure(settings: Settings) -> dict[str, Any]:
     """Disturb the network of a system on two hosts and return the result; raises LaunchFailed if a host or a namespace fails.
 
     Main keys: "oldest_ms", age of the oldest command that was obeyed [ms]; "back_s", longest time from the end of a disturbance until all
-    parts follow commands and the left arm, whose agent is on the second host, moves [s]; "transitions", dict with the numbers of "kept",
-    "lost" and "differing" ones on disk, and of "gaps" (numbers that occur twice on disk); "broken", list of the broken guarantees as text;
-    "rows", a list with a dict for each disturbance ("layout", "fault" and its measurements); "passed", whether no guarantee is broken, no
-    transition is lost or differs, and "back_s" is small enough.  If the machine was busy, times do not count.
+    parts of the robot follow commands and the left arm, whose agent is on the second host, moves [s]; "transitions", dict with numbers of
+    transitions: "kept" (on disk), "lost" (published, but not on disk), "differing" (with other values than published) and "gaps" (on disk
+    twice, under one number); "broken", list of the broken guarantees as text; "rows", a list with a dict for each disturbance ("layout",
+    "fault" and its measurements); "passed", whether no guarantee is broken, no transition is lost, differs or is stored twice, and "back_s"
+    is small enough.  If the machine was busy, "back_s" is not judged.
     """
     argv = [sys.executable, "-m", "mobee_system.run", "experiments.bench.network", msgspec.json.encode(asdict(settings)).decode()]
     done = subprocess.run(inside(argv), stdout=subprocess.PIPE, text=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Programs of other authors, for comparison: their import, CMA-ES, settings of coal's searches, and solvers of MDPs."""
+"""Programs of other authors, for comparison: how to import them, a strategy with CMA-ES, precise searches of coal, and solvers of MDPs."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ _COAL_TOLERANCE, _COAL_ITERATIONS, _COAL_SEARCH = 1e-12, 1000, "NesterovAccelera
 
 
 def make_searches_precise(found: Any) -> None:
-    """Change the settings of coal in Pinocchio's GeometryData `found`, so that its iterative searches miss no contact."""
+    """Set method, tolerances and iterations of coal's searches in `found` (Pinocchio's GeometryData), so that it misses no contact."""
     search = import_peer("coal", "coal", extra="dev").GJKVariant.names[_COAL_SEARCH]
     for request in found.distanceRequests:
         request.enable_signed_distance = True

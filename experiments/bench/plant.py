@@ -46,9 +46,10 @@ REQUIREMENTS = (
 class Settings:
     """Sizes and repetitions of the runs.
 
-    `actions`, `reaches` and `transitions`: how many there are in a run of one arm, of one arm that reaches, and of three agents.  `hashed`:
-    number of actions of the trajectory whose hash is computed twice.  `ticks`: number of control ticks for which MuJoCo's steps are timed.
-    `batched`: number of actions of each plant of a batch.  `rounds`: repetitions; the median counts.
+    `actions`: number of actions in a run of one arm.  `reaches`: number of reaches in a run of one arm.  `transitions`: number of
+    transitions in a run of three agents.  `hashed`: number of actions of the trajectory whose hash is computed twice.  `ticks`: number of
+    control ticks for which MuJoCo's steps are timed.  `batched`: number of actions of each plant of a batch.  `rounds`: number of
+    repetitions, of which the median is reported.
     """
 
     actions: int = 1000
@@ -241,9 +242,9 @@ def trajectory_hash(actions: int) -> str:
 
 
 class Batch:
-    """Several plants of one robot, each with its own empty world and one arm, which moves to random states of its lattice.
+    """Several plants of one robot, each with its own empty world and one arm, which moves to random states.
 
-    `count`: number of plants.
+    The states are those of a lattice of 256 postures of the arm.  `count`: number of plants.
     """
 
     def __init__(self, body: Robot, count: int = PLANTS) -> None:
@@ -278,9 +279,9 @@ def measure_batch(actions: int, rounds: int) -> dict[str, Any]:
 
     `actions`: number of actions of each plant of the batch in a round; the plant alone makes as many as the whole batch.
 
-    Keys: "plants", their number; "alone" and "together", each with "us_per_tick" and "ticks_per_second"; "ratio", ticks per second of the
-    batch over the plant alone; "two_threads", ticks per second of wall time on two threads over one, or None on one core.  All are medians
-    of the rounds.
+    Keys: "plants", their number; "alone" and "together", each with "us_per_tick" and "ticks_per_second"; "ratio", the batch's ticks per
+    second of processor time, divided by those of the plant alone; "two_threads", the batch's ticks per second of wall time on two threads,
+    divided by those on one thread, or None if two cores are not available.  All are medians of the rounds.
     """
     body = robot()
     one, many, shared = Batch(body, 1), Batch(body), Batch(body)

@@ -4,8 +4,8 @@
 Claim: the web page shows the first action of a curious agent at most 20 s after the command, 5 s of which are learning offline.  Each start
 is a command of its own, with an empty home and an empty working directory, and headless Chromium opens the page as soon as its address is
 printed.  The 3D view is not loaded: without a graphics card the browser would draw it on the processor.  The time without the learning is
-converted to the time that the standard machine needs, by the calibration loop in two processes at once.  At the end the system is stopped
-as by Ctrl-C.  Run time: 25 s per robot.
+converted to the time that the standard machine (calibration.py) needs.  For this, the speed of this machine is measured by two processes
+that do the calibration loop at the same time.  At the end the system is stopped as by Ctrl-C.  Run time: 25 s per robot.
 """
 
 from __future__ import annotations
@@ -66,11 +66,13 @@ def measure(settings: Settings) -> dict[str, Any]:
 
     Raises LaunchFailed if a start of a robot does not succeed.
 
-    Main keys: "starts", a list with a dict for each start: "robot"; "steps", times [s] of the steps until the page shows the first action;
-    "standard_s", the time until then as it is on the standard machine; "clean", whether it ended without error; and others;
-    "slowest_standard_s", median time of the slowest robot [s] as it is on the standard machine (the one for which the requirements were
-    set); "ends_clean", whether every system ended without error and left no process behind; "requirements", a list with the dict that
+    Main keys: "starts", a list with a dict for each start; "slowest_standard_s", the median of "standard_s" of the slowest robot [s];
+    "ends_clean", whether every system ended without error and left no process behind; "requirements", a list with the dict that
     `Requirement.judge` returns for each requirement; "passed", whether all are met and the ends were clean.
+
+    Main keys of a start: "robot", its name or file; "steps", a dict from each step to the time [s] since the command, up to the first
+    action on the page; "standard_s", the time of that action [s] on the standard machine (the one for which the requirements were set);
+    "clean", whether the system ended without error and left no process behind.
     """
     chromium = find_chromium()
     if chromium is None:

@@ -2,9 +2,9 @@
 """Robots, worlds and poses that benchmarks measure: an iCub-like upper body among boxes, and random robots of other makers.
 
 The upper body and its boxes are in data/bench_model.json.  The robots of other makers have the collision volumes that a URDF usually has.
-Each is a trunk of three joints with two arms of seven and a neck of two on it, and two legs of six at the base: 31 motors, a joint each,
-and two volumes per link.  Two links are not tested against each other if one is mounted on the other, if both are mounted on the same link,
-or if a single link is between them, as in most SRDFs.
+Each has a trunk (3 joints) on the base, two arms (7 joints each) and a neck (2 joints) on the trunk, and two legs (6 joints each) on the
+base.  These are 31 joints with one motor each.  Every link has two volumes.  Two links are not tested against each other if one is mounted
+on the other, if both are mounted on the same link, or if a single link is between them, as in most SRDFs.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ def upper_body_scene(boxes: int, poses: int) -> Scene:
 
 @dataclass(frozen=True, slots=True)
 class Maker:
-    """A kind of random robots, as examples of robots of other makers, and their worlds.
+    """Makes random robots, as examples of robots of other makers, and random worlds and poses for them.
 
     `kinds`: kinds of the collision volumes of a robot, equally many of each.  `around`: kinds of the objects around it.
     """
@@ -114,7 +114,7 @@ class Maker:
     around: tuple[ShapeKind, ...]
 
     def robot(self, seed: int = MAKER_SEED) -> Robot:
-        """Return the random robot with 31 motors.  All its volumes are fields, so that they cause repulsive forces.
+        """Return the random robot with 31 motors.  All its volumes cause repulsive forces (role "field").
 
         `seed`: of the draw.
         """

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The emergency stop under floods: time until robot_sim reports `estop`, by the record and by the bus, and until a client is connected.
+"""The emergency stop under floods: time until robot_sim obeys a stop from a file or from the bus, and time until a client is connected.
 
 Claim: under each flood of `experiments.kit.live.floods`, and with a thousand idle connections, the stop is obeyed within 50 ms in 99 of 100
 cases, and no process ends.  The robot moves by the motor model at 100 Hz, with its three agents; each stop is sent by a new client.  On the
 machine of robot_sim, `mobee estop` and the web page write the stop into a file, the record of stops: this time begins before it is written.
-From other machines a stop can come only by the bus: this time begins when the client is connected.  Both times end with the first published
-state of the head that says `estop`, at the time of robot_sim's clock in this state, which is at most a tick later.  Run time: about a
-minute for each flood.
+From other machines a stop can come only by the bus: this time begins when the client is connected.  Both times end at robot_sim's clock
+time in the first state of the head that has the gate state `estop`; this time is at most a tick after robot_sim has obeyed the stop.  Run
+time: about a minute for each flood.
 """
 
 from __future__ import annotations
@@ -50,8 +50,8 @@ _ARMED = 3.0  # s after a release in which the robot should move again
 class Settings:
     """Settings of the benchmark.
 
-    `floods`: names of the floods of messages under which the robot is stopped; "nothing" for none.  `stops`: number of stops under each
-    flood that are requested in the record of emergency stops, a file, and again the same number by a message on the bus.
+    `floods`: names of the floods of messages under which the robot is stopped; "nothing" for none.  `stops`: number of emergency stops
+    under each flood that are written into a file (the record of stops); the same number is sent as messages on the bus.
     """
 
     floods: Sequence[str] = (NOTHING, *FLOODS)
@@ -172,7 +172,7 @@ def _processes(session: Any) -> dict[str, int]:
 
 
 def report(result: dict[str, Any]) -> str:
-    """Return the result of `measure` as text: a table with one line for each flood."""
+    """Return the result of `measure` as text: a table with one line for each flood (many messages, calls or connections)."""
     lines = [
         f"From a stop to estop in ms, {result['stops']} stops by record and bus under each flood",
         f"at most {result['at_most_ms']:g} (p99); load of the machine {result['load']:.1f}",

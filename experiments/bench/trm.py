@@ -62,11 +62,12 @@ QUICK = Settings(spacing=0.03, vertices=300)
 def measure(settings: Settings) -> dict[str, Any]:
     """Run this benchmark and return its result.
 
-    Main keys: "rows", a dict from a method to a dict with the worst values of all seeds: times [s] ("wall_s", "processor_s",
-    "standard_wall_s"), number of "vertices", "evaluations" per vertex, "coverage" (share of the reachable points that are covered),
-    "largest_hole" (in units of the spacing), share of "valid" vertices, and share of "short_edges" (along which no motor turns too far);
-    "reachable", number of reachable points with which coverage is computed; "requirements", a list with the dict that `Requirement.judge`
-    returns for each requirement; "passed", whether all are met.
+    Main keys: "rows", a dict from a method to a dict of measures, each the worst one of all seeds; "reachable", number of reachable points
+    with which coverage is computed; "requirements", a list with the dict that `Requirement.judge` returns for each requirement; "passed",
+    whether all are met.  The measures are: times [s], "wall_s", "processor_s" and "standard_wall_s" (the wall time converted to the
+    standard machine of calibration.py); number of "vertices"; "evaluations" per vertex; "coverage" (share of the reachable points that are
+    covered); "largest_hole" (in units of the spacing); share of "valid" vertices; and share of "short_edges" (along which no motor turns
+    too far).
     """
     example = replace(pregrasp(), margin=0.0)  # all that can be reached
     spacing = np.full(len(example.task.names), settings.spacing)

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Requirements of benchmarks, the verdict on a result, and the lines of a report that state both.
 
-A number that is judged is a ratio, a size or a count, or a time on the standard machine (calibration.py): never a bare time.
+The judged numbers are ratios, sizes, counts, and times that were converted to the standard machine (calibration.py).  A time as measured on
+this machine is not judged.
 """
 
 from __future__ import annotations
@@ -26,9 +27,10 @@ class Requirement:
     aim: float | None = None
 
     def judge(self, result: Mapping[str, Any]) -> dict[str, Any]:
-        """Return whether a result meets this requirement.  Raises KeyError if the number was not measured.
+        """Return a dict that says whether a result meets this requirement.  Raises KeyError if the result does not contain the number.
 
-        Keys: "name", "found" (the number), its bounds, "aim" and "passed"; bounds that are None are absent.  NaN does not pass.
+        Keys: "name"; "found", the number to which the requirement applies; "at_least", "at_most" and "aim", each only if it is not None;
+        and "passed", whether the number is within the bounds (NaN is not).
         """
         found = self._number_in(result)
         passed = (self.at_least is None or found >= self.at_least) and (self.at_most is None or found <= self.at_most)
@@ -72,8 +74,8 @@ def requirement_lines(requirements: Iterable[Mapping[str, Any]]) -> list[str]:
 def report_text(lines: Iterable[str], result: Mapping[str, Any], speed: float | None = None) -> str:
     """Return the text of a benchmark's report.
 
-    It has `lines`, then the speed of this machine if it was measured, then the requirements in `result`.  The speed is in `result`, or is
-    `speed`, in multiples of that of the standard machine, the one for which the requirements were set.
+    It has `lines`, then the speed of this machine if it was measured, then the requirements in `result`.  The speed is the value of "speed"
+    in `result`, or else the argument `speed`.  It is a multiple of the speed of the standard machine, for which the requirements were set.
     """
     speed = result.get("speed", speed)
     calibration = [] if speed is None else [f"Calibration: {speed:.2f} x the standard machine's speed.  Required, in its time:"]

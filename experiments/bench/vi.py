@@ -62,10 +62,11 @@ QUICK = Settings(problems=50, rounds=3, observations=50, large_rounds=1)
 def measure(settings: Settings) -> dict[str, Any]:
     """Run this benchmark and return its result; raises NotInstalled without quantecon.
 
-    Main keys: "us", a dict from a solver to the median processor time of a plan [us]; "cold_times_scipy" and the like, time of a peer over
-    the time of our plan from zero values ("cold") or from the values of the plan before ("warm"); "difference", largest relative difference
-    from policy iteration; "residual", largest Bellman residual in units of the tolerance; "requirements", a list with the dict that
-    `Requirement.judge` returns for each requirement; "passed", whether all are met.
+    Main keys: "us", a dict from a solver to the median processor time of a plan [us]; "cold_times_scipy", "warm_times_scipy",
+    "cold_times_quantecon" and "warm_times_quantecon", the time of SciPy or quantecon divided by the time of our plan (a cold plan starts
+    from zero values, a warm plan from the values of the plan before); "difference", largest relative difference from policy iteration;
+    "residual", largest Bellman residual in units of the tolerance; "requirements", a list with the dict that `Requirement.judge` returns
+    for each requirement; "passed", whether all are met.
     """
     load_quantecon()
     with one_core() as core, Progress() as progress:
@@ -150,7 +151,7 @@ class ChangingProblem:
     changes: tuple[Row, ...]
 
     def apply_changes(self) -> None:
-        """Make all changes in order, in place.  Afterwards the tables are the same as before."""
+        """Make all changes in order, in place.  The last ones undo the first ones, so that the tables are as before."""
         for change in self.changes:
             self.tables.put(change)
 
@@ -185,10 +186,11 @@ def random_problem(seed: int) -> tuple[Tables, float]:
 
 
 def problem_of_size(states: int, observations: int = 3, seed: int = 0) -> ChangingProblem:
-    """Return a random decision problem with this number of states, and changes of action 0 in `observations` random states.
+    """Return a random decision problem with this number of states, and changes of it.
 
-    Each state has 16 actions to states of similar number.  An action has three outcomes: the goal, the same state, or the state after the
-    goal.  `seed`: of the draw.
+    Each state has 16 actions to goals whose numbers differ from its own by at most 64 (MAX_STATE_STEP), modulo the number of states.  An
+    action has three outcomes: the goal, the same state, or the state numbered one higher than the goal.  Each of the `observations` changes
+    replaces the entries of action 0 in a random state.  `seed`: of the random numbers.
     """
     rng = np.random.default_rng(seed)
     goals = (np.arange(states)[:, None] + rng.integers(-MAX_STATE_STEP, MAX_STATE_STEP + 1, (states, ACTIONS))) % states
@@ -200,9 +202,10 @@ def problem_of_size(states: int, observations: int = 3, seed: int = 0) -> Changi
 
 
 def after_transitions(transitions: int, observations: int, seed: int = 0) -> ChangingProblem:
-    """Return the transition model of a curious agent after `transitions` transitions, and its next observations as changes.
+    """Return the transition model that a curious agent has learned after `transitions` transitions, and changes of it.
 
-    The agent moves an arm with 81 states and 16 actions per state.  `seed`: of agent and plant.
+    Each of the agent's next `observations` observations changes the entries of one state-action.  The new entries are those that the model
+    has after all these observations.  The agent moves an arm with 81 states and 16 actions per state.  `seed`: of agent and plant.
     """
     space = arm_space(neighbours=ACTIONS)
     agent = CuriousAgent(space, TabularPlant(space, *half_space(space), seed=seed), seed=seed)
@@ -223,11 +226,12 @@ def _tables_of(agent: CuriousAgent) -> Tables:
 
 
 def contestants(problem: ChangingProblem, discount: float = DISCOUNT, repeats: int = 20) -> dict[str, Contestant]:
-    """Return a dict from the name of each solver to a contestant; each run repeats its plans `repeats` times.
+    """Return a dict from the name of each solver to a contestant, whose `run` repeats the solver's work `repeats` times.
 
-    "ours, warm" plans after each change of the problem and starts from the values of the plan before; "changes of the model alone" only
-    makes the changes, so that their time can be subtracted.  Raises ArithmeticError if a peer's values differ from the exact ones by more
-    than the tolerance allows.  `discount`: factor of future rewards.
+    "ours, warm" plans after each change of the problem and starts from the values of the plan before.  "changes of the model alone" makes
+    the same changes without planning, so that their time can be subtracted.  The other solvers plan for the unchanged problem.  Raises
+    ArithmeticError if the values of SciPy or quantecon differ from the exact ones by more than the tolerance allows.  `discount`: factor of
+    future rewards.
     """
     first = problem.tables
     peer = DecisionProblem(first, first.reward, discount, TOLERANCE)
@@ -250,7 +254,10 @@ def contestants(problem: ChangingProblem, discount: float = DISCOUNT, repeats: i
 
 
 def large_contestants(states: int) -> dict[str, Contestant]:
-    """Return two contestants, ours and SciPy, that each make one plan from zero values for a problem with this number of states."""
+    """Return two contestants, our solver and SciPy, for one problem with this number of states.
+
+    The `run` of each makes one plan, which starts from zero values.
+    """
     tables = problem_of_size(states).tables
     peer = DecisionProblem(tables, tables.reward, DISCOUNT, TOLERANCE)
     return {COLD: Contestant(lambda: _plan_cold(tables), 1), SCIPY: Contestant(peer.scipy_values, 1)}

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A plant with MuJoCo in one process: model, controller and physics tick by tick, as the live system runs them in lockstep.
 
-The model has a world with the things where they are believed to be; the physics has another world, with the things where they truly are.
+There are two worlds.  In the model's world, objects are where the robot believes them to be.  In the world of the physics, they are at
+their true places.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ class PhysicsPlant:
 
     Args:
         model: the robot in the world as it is believed to be.
-        truth: the world of the physics, as it truly is.
+        truth: the world that MuJoCo simulates, with all objects at their true places.
         seed: of the encoders' noise.
         start: (n,) rad, the posture at the start, at rest.
         torques: largest torques of motors, N m, by pattern of motor names, as "?_pinky"; the other motors keep those of the robot's file.
@@ -151,7 +152,7 @@ class PhysicsPlant:
         return Followed(False, self.q)
 
     def press(self, q: Array, seconds: float) -> None:
-        """Set the attractor to q (n,) rad at once, and run for `seconds`."""
+        """Set the attractor (posture to which the control law pulls) to q (n,) rad in one step, and run for `seconds` of simulated time."""
         self.controller.attractor = q
         self.run(seconds)
 

@@ -22,8 +22,8 @@ class MatplotlibMissing(MobeeError):
 def new_figure(width: float, height: float) -> Any:
     """Return an empty Matplotlib Figure of this width and height in inches.
 
-    Raises MatplotlibMissing.  Raises InvalidValue for a size of 0: a caller asks for this size if no run is finished that the figure could
-    show.
+    Raises MatplotlibMissing.  Raises InvalidValue if the width or height is not above 0: a caller that computes the size from the number of
+    finished runs gets 0 if no run is finished.
     """
     if not (width > 0.0 and height > 0.0):
         raise InvalidValue("none of the runs that the figure shows is finished: continue the run with --resume.")
@@ -122,9 +122,9 @@ def draw_heights(axes: Any, values: ArrayLike, **style: Any) -> None:
 
 
 def draw_stacked_bars(axes: Any, runs: Sequence[Array]) -> Array:
-    """Draw the numbers of several runs as stacked bars at x = 0, 1, ..., with a colour for each run; returns the total heights (L,).
+    """Draw L bars at x = 0, 1, ..., each stacked from one value of every run, with a colour for each run; returns their heights (L,).
 
-    `runs`: for each run, the heights (L,) of its share of the bars.  `axes`: of Matplotlib.
+    `runs`: for each run, its L values, one for each bar.  The first run is at the bottom.  `axes`: of Matplotlib.
     """
     heights = np.zeros(len(runs[0]))
     for run in runs:

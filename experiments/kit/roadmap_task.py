@@ -52,12 +52,12 @@ BOTH_HANDS = ("torso", *LEFT_ARM, *RIGHT_ARM)
 class Example:
     """The arguments of `mobee.build_roadmap` for one roadmap, and a motion through the roadmap for pictures.
 
-    `title`, `figure`: of the pictures, and number of the figure in the thesis.  `costs`: cost terms whose tolerances every pose must
+    `title`: title of the pictures.  `figure`: number of the figure in the thesis.  `costs`: cost terms whose tolerances every pose must
     satisfy.  `task`: the task space.  `spacing`: distance between vertices, in the units of the task coordinates.  `motors`: names of the
     moving motors or parts.  `start`: (n,) rad, a posture of all motors: start of the search, and where the motors that do not move stay;
-    None: home.  `markers`: markers whose positions are drawn for every vertex.  `via`: task coordinates through which the motion passes
-    that the pictures show, in order.  `views`: camera views of these pictures.  `margin`: distance of the motors from their limits [rad];
-    with MARGIN (10 degrees) the default control law, which pushes motors away from their limits, exerts no such force in any pose of the
+    None: home.  `markers`: markers whose positions are drawn for every vertex.  `via`: the pictures show a motion through these task
+    coordinates, in this order.  `views`: camera views of these pictures.  `margin`: distance of the motors from their limits [rad]; with
+    MARGIN (10 degrees) the default control law, which pushes motors away from their limits, exerts no such force in any pose of the
     roadmap.
     """
 
@@ -81,9 +81,9 @@ def one_hand(model: Model, title: str, figure: str, terms: Sequence[Term], task:
     The motors stay at least 10 degrees (MARGIN) away from their limits, because nearer to a limit the default control law pushes them away
     from it, so that the robot cannot rest there.
 
-    `title`, `figure`: of the pictures, and number of the figure in the thesis.  `terms`: costs of this example; those of contacts and of
+    `title`: title of the pictures.  `figure`: number of the figure in the thesis.  `terms`: costs of this example; those of contacts and of
     the distance from home are added to them.  `task`: the task space.  `spacing`: distance between vertices, in the units of the task
-    coordinates.  `more`: other fields of `Example`, which replace the values above.
+    coordinates.  `more`: other fields of `Example`.  This function sets `motors`, `start` and `margin`; values in `more` replace them.
     """
     return _example(model, title, figure, terms, task, spacing, {"motors": ONE_HAND, "start": left_aside(model.robot)} | more)
 
@@ -94,9 +94,9 @@ def both_hands(model: Model, title: str, figure: str, terms: Sequence[Term], tas
     The motors stay at least 10 degrees (MARGIN) away from their limits, because nearer to a limit the default control law pushes them away
     from it, so that the robot cannot rest there.
 
-    `title`, `figure`: of the pictures, and number of the figure in the thesis.  `terms`: costs of this example; those of contacts and of
+    `title`: title of the pictures.  `figure`: number of the figure in the thesis.  `terms`: costs of this example; those of contacts and of
     the distance from home are added to them.  `task`: the task space.  `spacing`: distance between vertices, in the units of the task
-    coordinates.  `more`: other fields of `Example`, which replace the values above.
+    coordinates.  `more`: other fields of `Example`.  This function sets `motors`, `markers` and `margin`; values in `more` replace them.
     """
     return _example(model, title, figure, terms, task, spacing, {"motors": BOTH_HANDS, "markers": (LEFT, RIGHT)} | more)
 

@@ -36,9 +36,9 @@ ABOUT_EQUAL = (0.9, 1.1)
 
 
 def row(runs: Sequence[Run], columns: Mapping[str, Callable[[Run], float]]) -> dict[str, Any]:
-    """Return a row of results: under "seeds" the number of runs, and under each label the interquartile mean of a number of the runs.
+    """Return a row of results as a dict: "seeds" is the number of runs; every other key is a label, its value an interquartile mean.
 
-    `columns`: by label, the function that computes this number from a run.
+    `columns`: for each label, the function that computes one number from a run; the mean is taken over the runs.
     """
     return {"seeds": len(runs)} | {label: mean_over(runs, number) for label, number in columns.items()}
 
@@ -74,10 +74,11 @@ def all_hold(verdicts: Iterable[bool | None]) -> bool | None:
 
 
 def within(values: ArrayLike, digits: int = 2, least: float = -np.inf, most: float = np.inf, text: str = "{}") -> Decided:
-    """Judge by the interval whether the interquartile mean of a group lies within [least, most].
+    """Judge from the bootstrap interval whether the interquartile mean of a group lies within [least, most].
 
-    Returns our number as text, and whether the claim holds (None: the interval does not decide it).  `values`: a number from each run of
-    the group.  `digits`: decimals of the estimate.  `text`: format of the text; {} is the estimate.
+    Returns the mean with its 95 % interval as text, and the verdict: True if the whole interval lies within [least, most], False if it lies
+    outside, None if it contains a bound.  `values`: one number per run of the group.  `digits`: decimals of the estimate.  `text`: format
+    of the text; {} is the estimate.
     """
     return text.format(estimate(values, digits)), decides(interval(values), least, most)
 
@@ -85,20 +86,21 @@ def within(values: ArrayLike, digits: int = 2, least: float = -np.inf, most: flo
 def ratio_within(
     above: ArrayLike, below: ArrayLike, digits: int = 2, least: float = -np.inf, most: float = np.inf, text: str = "{}"
 ) -> Decided:
-    """Judge by the interval whether the ratio of the interquartile means of two groups lies within [least, most].
+    """Judge from the bootstrap interval whether the ratio of the interquartile means of two groups lies within [least, most].
 
-    Returns our number as text, and whether the claim holds (None: the interval does not decide it).  `above`, `below`: a number from each
-    run of the group in the numerator, and of that in the denominator.  `digits`: decimals of the estimate.  `text`: format of the text; {}
-    is the estimate.
+    Returns the ratio with its 95 % interval as text, and the verdict: True if the whole interval lies within [least, most], False if it is
+    outside, None if it contains a bound.  `above`: one number per run of the group in the numerator.  `below`: the same for the group in
+    the denominator.  `digits`: decimals of the estimate.  `text`: format of the text; {} is the estimate.
     """
     return text.format(ratio_estimate(above, below, digits)), decides(ratio_interval(above, below), least, most)
 
 
 def about(span: tuple[float, float], least: float, most: float, stronger_below: bool) -> Holds:
-    """Judge by its interval `span` (low, high) whether an effect has the published size, from `least` to `most`.
+    """Judge from the interval `span` (low, high) of an effect whether the effect has the published size, from `least` to `most`.
 
-    True within these bounds, False outside, None if the interval contains a bound; "stronger" if it lies outside where the effect is
-    larger: below `least` with `stronger_below`, else above `most`.
+    Returns True if the whole interval lies within these bounds, and None if it contains a bound.  If it lies outside, the result is
+    "stronger" on the side where the effect is larger than published, and False on the other side.  `stronger_below`: the effect is
+    larger below `least`; otherwise it is larger above `most`.
     """
     found = decides(span, least, most)
     is_stronger = span[1] < least if stronger_below else span[0] > most
@@ -115,9 +117,10 @@ def equivalent(first: ArrayLike, second: ArrayLike, margin: float) -> bool | Non
 
 
 def is_above(first: ArrayLike, second: ArrayLike) -> bool | None:
-    """Return whether the interquartile mean of the first group is above that of the second, by the interval of the difference.
+    """Return whether the interquartile mean of the first group is above that of the second.
 
-    True if the whole interval is above 0, False if no part of it is, None if only a part is.
+    The bootstrap interval of the difference of the means decides: True if the whole interval is above 0, False if no part of it is above 0,
+    None if 0 lies inside it.  `first`, `second`: one number per run of each group.
     """
     return _sign(difference_interval(first, second))
 
@@ -140,11 +143,12 @@ def stands_below(values: Mapping[Key, ArrayLike], name: Key) -> bool | None:
 
 
 def better(values: Mapping[str, ArrayLike], name: str, rivals: Sequence[str], worse: bool = False, digits: int = 2) -> Decided:
-    """Judge whether the runs of the group `name` are above those of every rival, or with `worse` below; returns text and verdict.
+    """Judge whether the numbers of the group `name` are larger than those of every group in `rivals`; returns text and verdict.
 
-    `values`: for each group, by its key, a number from each of its runs.  The runs are above a rival's if the interval of the probability
-    of improvement lies above one half.  They are not above if this interval lies below one half, or if both groups are equivalent: the
-    interval of the ratio of their means lies within 0.9 to 1.1.  `digits`: decimals in the text.
+    `values`: for each group, by its key, one number per run.  `worse`: judge whether they are smaller instead.  `digits`: decimals in the
+    text.  For each rival, the verdict is True if the interval of the probability of improvement lies above one half.  It is False if this
+    interval lies below one half, or if both groups are equivalent: the interval of the ratio of their means lies within 0.9 to 1.1.
+    Otherwise it is None.  The verdicts are combined by `all_hold`.
     """
     parts, verdicts = [f"{name} {estimate(values[name], digits)}"], list[bool | None]()
     for rival in rivals:
@@ -164,9 +168,10 @@ def _about_equal(first: ArrayLike, second: ArrayLike) -> bool:
 
 
 def rises(change: ArrayLike) -> bool | None:
-    """Return whether the interquartile mean of `change`, a number from each run, is above 0, by its interval.
+    """Return whether the interquartile mean of `change` is above 0.
 
-    True if the whole interval is above 0, False if no part of it is, None if only a part is.
+    The bootstrap interval of the mean decides: True if the whole interval is above 0, False if no part of it is above 0, None if 0 lies
+    inside it.  `change`: one number per run.
     """
     return _sign(interval(change))
 

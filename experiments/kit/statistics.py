@@ -54,7 +54,7 @@ def _deciding_at(level: float, samples: dict[tuple[object, ...], Array]) -> Iter
 def decision_level() -> float:
     """Return the confidence level of the intervals that decide claims: LEVEL (0.95), or the level that a call of `error_rate` tries now.
 
-    The call also makes it known to `error_rate` that its decision uses intervals.
+    The call has a side effect: inside `error_rate`, it records that the decision uses intervals.
     """
     made = _decisions.get(_Decisions())
     made.used = True
@@ -62,16 +62,19 @@ def decision_level() -> float:
 
 
 def level_of_each(looks: int) -> float:
-    """Return the level of each interval for a claim that holds as soon as one of `looks` comparisons holds (Bonferroni)."""
+    """Return the confidence level of each interval for a claim that holds as soon as one of several comparisons holds (Bonferroni).
+
+    `looks`: number of comparisons.
+    """
     return 1.0 - (1.0 - decision_level()) / looks
 
 
 def error_rate(decide: Callable[[], Found], key: Callable[[Found], object] = lambda found: found) -> tuple[Found, float | None]:
-    """Return the result of `decide` with 95 % intervals, and the smallest error rate of the intervals at which the result is the same.
+    """Return the result of `decide` with 95 % intervals, and the smallest error rate in RATES at which the result does not change.
 
-    The error rate of an interval is one minus its confidence level.  The returned rate is the p value of the decision, rounded up to one of
-    RATES; if several intervals must all decide, it is the largest of their p values.  It is None if `decide` computes no interval.  `key`:
-    results with equal keys count as the same.
+    The error rate of an interval is one minus its confidence level: wider intervals have smaller rates.  `decide` is called again with
+    other levels to find the rate.  It is the p value of the decision, rounded up to one of RATES; if the result needs several intervals,
+    it is the largest of their p values.  It is None if `decide` computes no interval.  `key`: results with equal keys count as the same.
     """
     samples: dict[tuple[object, ...], Array] = {}  # intervals of all levels are quantiles of the same samples
 
@@ -121,10 +124,10 @@ def interval(
     Args:
         values: (n,).
         statistic: function of bootstrap samples (resamples, n) that computes a number of each sample, along the last axis.
-        strata: (n,) labels: each place of a sample is filled from the values that have the same label as this place; None: from all values.
+        strata: (n,) label of each value: entry i of a sample is drawn from the values with the label strata[i]; None: from all values.
         seed: of the bootstrap.
         resamples: number of bootstrap samples.
-        level: confidence level, 0 to 1; None: that of `decision_level`, 0.95 unless a call of `error_rate` tries another one.
+        level: confidence level, 0 to 1; None: the level of `decision_level`, which is 0.95 outside `error_rate`.
     """
     given = _checked(values)
     labels = np.zeros(len(given)) if strata is None else np.asarray(strata)
@@ -177,8 +180,8 @@ def ratio(above: ArrayLike, below: ArrayLike) -> float:
 def ratio_interval(above: ArrayLike, below: ArrayLike, level: float | None = None) -> tuple[float, float]:
     """Return the bootstrap interval (low, high) of `ratio`; both groups are resampled.
 
-    `level`: confidence level, 0 to 1; None: that of `decision_level`, 0.95 unless a call of `error_rate` tries another one.  `above`,
-    `below`: values of the group in the numerator, and of that in the denominator.
+    `level`: confidence level, 0 to 1; None: the level of `decision_level`, which is 0.95 outside `error_rate`.  `above`:
+    (n,), values of the group in the numerator.  `below`: (m,), values of the group in the denominator.
     """
     return _of_both(above, below, _ratios, level)
 
@@ -186,8 +189,7 @@ def ratio_interval(above: ArrayLike, below: ArrayLike, level: float | None = Non
 def difference_interval(first: ArrayLike, second: ArrayLike, level: float | None = None) -> tuple[float, float]:
     """Return the bootstrap interval (low, high) of the interquartile mean of `first` (n,) minus that of `second` (m,).
 
-    Both groups are resampled.  `level`: confidence level, 0 to 1; None: that of `decision_level`, 0.95 unless a call of `error_rate` tries
-    another one.
+    Both groups are resampled.  `level`: confidence level, 0 to 1; None: the level of `decision_level`, which is 0.95 outside `error_rate`.
     """
     return _of_both(first, second, _differences, level)
 
@@ -203,21 +205,24 @@ def _differences(first: Array, second: Array) -> Array:
 def ratio_estimate(above: ArrayLike, below: ArrayLike, digits: int = 2) -> str:
     """Return the `ratio` of two groups and its 95 % interval as text, as "1.50 [1.20, 1.90]"; `digits`: decimals.
 
-    `above`, `below`: values of the group in the numerator, and of that in the denominator.
+    `above`: (n,), values of the group in the numerator.  `below`: (m,), values of the group in the denominator.
     """
     low, high = ratio_interval(above, below, LEVEL)
     return f"{ratio(above, below):.{digits}f} [{low:.{digits}f}, {high:.{digits}f}]"
 
 
 def probability_of_improvement(first: ArrayLike, second: ArrayLike) -> float:
-    """Return the probability that a value of `first` (n,) is above one of `second` (m,); ties count half (Mann-Whitney U / nm)."""
+    """Return the probability that a value of `first` (n,) is above one of `second` (m,); ties count half.
+
+    It is the Mann-Whitney U statistic divided by n * m.
+    """
     return float(_improvements(_checked(first), _checked(second)))
 
 
 def improvement_interval(first: ArrayLike, second: ArrayLike, level: float | None = None) -> tuple[float, float]:
     """Return the bootstrap interval (low, high) of `probability_of_improvement`; both groups are resampled.
 
-    `level`: confidence level, 0 to 1; None: that of `decision_level`, 0.95 unless a call of `error_rate` tries another one.  `first` (n,),
+    `level`: confidence level, 0 to 1; None: the level of `decision_level`, which is 0.95 outside `error_rate`.  `first` (n,),
     `second` (m,): the values of the two groups.
     """
     return _of_both(first, second, _improvements, level)
@@ -252,7 +257,7 @@ def chi_squared(share: float, freedom: int) -> float:
 def share_interval(successes: int, tries: int, level: float | None = None) -> tuple[float, float]:
     """Return the interval (low, high) of a share of successes in independent tries (Wilson 1927).
 
-    `level`: confidence level, 0 to 1; None: that of `decision_level`, 0.95 unless a call of `error_rate` tries another one.
+    `level`: confidence level, 0 to 1; None: the level of `decision_level`, which is 0.95 outside `error_rate`.
     """
     from scipy.stats import binomtest  # a second, and only shares need it
 

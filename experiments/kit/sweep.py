@@ -114,7 +114,10 @@ class Sweep:
         return self.results(folder)
 
     def results(self, folder: Path) -> dict[str, Any]:
-        """Return the results that `findings` computes from the finished cells in the folder of a run."""
+        """Return the results that `findings` computes from the finished cells in the folder of a run.
+
+        A cell is one trial with one condition and one seed.
+        """
         return self.findings(self._loaded(folder))
 
     def _loaded(self, folder: Path) -> dict[str, CellResult]:
@@ -122,7 +125,11 @@ class Sweep:
         return found if self.summary is None else {name: _summarised(one, self.summary) for name, one in found.items()}
 
     def recorded(self, folder: Path) -> AbstractContextManager[Path]:
-        """Return a context manager that yields the run's folder, or, if there is a `summary`, a temporary folder with the reduced cells."""
+        """Return a context manager that yields the folder of the cells for the raw record.
+
+        Without `summary` it is the folder of the run.  With `summary` it is a temporary folder, in which the cells have only their reduced
+        values.
+        """
         return nullcontext(folder) if self.summary is None else reduced_cells(folder, partial(_reduced, self.summary))
 
     def figure(self, folder: Path) -> Path:
@@ -153,10 +160,10 @@ def _run_trial(trial: Trial, cell: Cell) -> dict[str, Any]:
 
 
 def grouped(found: Cells, setting: str, order: Sequence[Any]) -> dict[Any, list[dict[str, Any]]]:
-    """Return the values of the finished cells in groups: a list sorted by seed for each value of one setting.
+    """Group the values of the finished cells (trials with one condition and seed) by the value of one setting.
 
-    `found`: the cells by name.  `setting`: name of the setting.  `order`: its values, in the order of the groups; a value without finished
-    cells is left out.
+    Returns for each value of the setting the list of its cells' values, sorted by seed.  `found`: the cells by name.  `setting`: name of
+    the setting.  `order`: values of the setting, in the order of the returned groups; a value without finished cells is left out.
     """
     cells = sorted(found.values(), key=lambda result: result.cell.seed)
     groups = {value: [one.values for one in cells if one.cell.settings[setting] == value] for value in order}
@@ -164,17 +171,19 @@ def grouped(found: Cells, setting: str, order: Sequence[Any]) -> dict[Any, list[
 
 
 def grouped_by(found: Cells, *settings: str) -> dict[tuple[Any, ...], list[dict[str, Any]]]:
-    """Return the values of the finished cells in groups: a list sorted by seed for each combination of values of the named settings.
+    """Group the values of the finished cells (trials with one condition and seed) by the values of several settings.
 
-    The key of a group is the tuple of these values.
+    The key of a group is the tuple of the values of the settings, in the given order.  The group is the list of its cells' values, sorted
+    by seed.  `found`: the cells by name.  `settings`: names of the settings.
     """
     return runs_by(found, lambda result: result.values, *settings)
 
 
 def runs_by(found: Cells, of: Callable[[CellResult], Run], *settings: str) -> dict[tuple[Any, ...], list[Run]]:
-    """Call `of` on each finished cell, and return the results in groups: a list sorted by seed for each combination of settings.
+    """Call `of` on each finished cell (trial with one condition and seed), and group the results by the values of several settings.
 
-    The key of a group is the tuple of the values of the named settings.
+    The key of a group is the tuple of the values of the settings, in the given order.  The group is the list of the results of its cells,
+    sorted by seed.  `found`: the cells by name.  `settings`: names of the settings.
     """
     groups: dict[tuple[Any, ...], list[Run]] = {}
     for result in sorted(found.values(), key=lambda result: result.cell.seed):
@@ -185,10 +194,10 @@ def runs_by(found: Cells, of: Callable[[CellResult], Run], *settings: str) -> di
 def run_cells(work: Work, cells: Sequence[Cell], folder: Path, arguments: argparse.Namespace) -> None:
     """Run the cells that are not in `folder` yet; each is written to disk as soon as it is finished.
 
-    `work`: function of a module, so that other processes can import it; returns a dict of JSON values and arrays, which depend on its cell
-    alone.  `arguments`: the options `jobs`, `engine` and `track`.  If the program is killed, only the unfinished cells are lost.  With the
-    option --track, the transitions that agents learn in a cell and the numbers that it returns are written as event files for TensorBoard,
-    too.
+    `work`: function that runs one cell and returns its result, a dict of JSON values and arrays.  The result must depend only on the cell.
+    The function must be importable from a module, because other processes run it.  `arguments`: the options `jobs`, `engine` and `track`.
+    If the program is killed, only the unfinished cells are lost.  With the option --track, two things are also written as event files for
+    TensorBoard: the learning curves of the agents of each cell, and the numbers in its result.
 
     Raises:
         InvalidValue: two cells have the same name, or the folder has a cell of this name with other settings.
@@ -273,9 +282,10 @@ def sweep_arguments(parser: argparse.ArgumentParser, seeds: int = 10) -> None:
 
 
 class TimeLeft:
-    """Predicts the remaining time of a sweep from the costs of its cells and the time that the finished ones took.
+    """Predicts the remaining time of a sweep from the costs of its cells and the time since the start.
 
-    `everything`: costs of all cells.  `left`: costs of the cells that are not finished at the time `start` [s].
+    A cell is one trial with one condition and seed.  Its cost is its expected duration, relative to the others, in any unit.  `everything`:
+    costs of all cells.  `left`: costs of the cells that are not finished at the time `start` [s].
     """
 
     def __init__(self, everything: Sequence[float], left: Sequence[float], start: float) -> None:
@@ -283,17 +293,23 @@ class TimeLeft:
         self._done, self._now = 0.0, start
 
     def finished(self, cost: float, now: float) -> None:
-        """Record that a cell of this cost has finished at the time `now` [s]."""
+        """Record that a cell (one trial) has ended at the time `now` [s]; `cost`: its expected duration relative to the others."""
         self._done, self._now = self._done + cost, now
 
     @property
     def fraction(self) -> float:
-        """The cost of the finished cells, including those of earlier runs, divided by the cost of all cells; 0 to 1."""
+        """The share of the work that is done, 0 to 1: sum of the costs of the ended cells, divided by the sum of the costs of all cells.
+
+        Cells that were finished before `start` count as ended.
+        """
         return 1.0 - (self._left - self._done) / self._all if self._all else 1.0
 
     @property
     def seconds(self) -> float:
-        """The predicted remaining time [s] at the average speed so far; infinite before a cell has finished."""
+        """The predicted remaining time [s]; infinite before a cell has ended.
+
+        It is the remaining cost times the average time per unit of cost since `start`.
+        """
         return (self._left - self._done) * (self._now - self._start) / self._done if self._done else float("inf")
 
     def __str__(self) -> str:

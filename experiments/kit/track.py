@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Writes what agents learn, transition by transition, and the numbers of trials as event files for TensorBoard.
+"""Writes event files for TensorBoard: the learning curves of agents, and the numbers that trials return.
 
-Each agent and each trial has its own folder below `tensorboard/`, which is one run in TensorBoard.  The steps of the curves are
-transitions.
+Each agent and each trial has its own folder below `tensorboard/`, which is one run in TensorBoard.  The learning curves have one step per
+transition.
 """
 
 from __future__ import annotations
@@ -94,9 +94,10 @@ class LearningCurves:
 
 @contextmanager
 def tracked(folder: Path) -> Iterator[None]:
-    """Write the learning curves of all agents that learn in this process during a `with` statement, each into `folder`/<name of its part>.
+    """Write the learning curves of all agents that learn in this process during a `with` statement, as event files of TensorBoard.
 
-    The files are event files of TensorBoard.  An inner `tracked` replaces the outer one until it ends.
+    The curves of an agent are written to `folder`/<body part of the agent>; further agents of the same part get -2, -3, ... appended.
+    While an inner `tracked` is active, the outer one writes nothing.
     """
     curves: dict[CuriousLearner, LearningCurves] = {}
     parts = Counter[str]()
@@ -129,7 +130,8 @@ def track_values(values: Mapping[str, Any], folder: Path) -> None:
 def track_stores(run: Path, robot: Robot | None = None) -> None:
     """Write the curves of the agents whose transitions are in SQLite stores below the folder of a run, such as those of a live system.
 
-    The event files are below `run`/tensorboard.  `robot`: the agents' robot; None: the shipped robot with the recorded name.
+    The event files are below `run`/tensorboard.  `robot`: the agents' robot; None: the robot is loaded by the name that
+    the store has recorded, as by `mobee.robot.load.load_robot`.
     """
     for file in sorted(run.rglob(STORE)):
         with TransitionStore(file, "", read_only=True) as store:

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Programs that write the shipped robot files from numbers."""
+"""Programs that write the files of the shipped iCub models, and the list of link pairs that count as solid contact."""

@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Volumes of the iCub that are chosen by hand: force fields, and solids that follow its meshes closer than one primitive per link.
+"""Volumes of the iCub that are chosen by hand: force fields, and boxes that fit the meshes better than one primitive per link.
 
 Zero pose, root frame, [m]; the right arm mirrors the left in y.
 
-The fields are few spheres and capsules around the solids of each body section. Beyond the solids the fields of hand and fingers reach 5 to
-7 cm, forearm 5, elbow, torso and head 3 to 4, upper arm 3, and the flanks of pelvis and chest 1, because an arm hangs beside them at home.
+The fields are few spheres and capsules around the solids of each body section. They extend beyond the solids by 5 to 7 cm at hand and
+fingers, 5 cm at the forearm, 3 to 4 cm at elbow, torso and head, and 3 cm at the upper arm. At the flanks of pelvis and chest it is only
+1 cm, because an arm hangs beside them at home.
 
-The entry models.icub_v2_5 of the JSON data encloses pelvis, chest and head in a box, a cylinder and a sphere of 1.5 to 1.7 times the hull's
-volume; with these, pelvis and upper arm would touch at home. BOXES are the bounds, rounded outwards to 1 mm, of the part of a mesh of
-icub-models (CC BY-SA 4.0) between horizontal cuts.
+The entry models.icub_v2_5 of the JSON data encloses the pelvis in a box, the chest in a cylinder and the head in a sphere. They
+have 1.5 to 1.7 times the volume of the convex hull of the mesh, and pelvis and upper arm would touch at home. BOXES replaces them. The mesh
+in icub-models (CC BY-SA 4.0) is cut horizontally into slices; each box is the bounding box of a slice, rounded outwards to 1 mm.
 """
 
 from __future__ import annotations

@@ -2,7 +2,8 @@
 """Write mobee/robot/robots/icub.xml, the iCub v2.5 upper body with 41 motors.
 
 Source: the entries models.icub_v2_5 (derived from robotology/icub-models, CC BY-SA 4.0), yarp_parts and shoulder_constraints.mobee_2014 of
-DATA.json; fields are ours.  The file names the meshes of the installed icub-models, which viewers draw.
+DATA.json.  The force fields (volumes around links that cause repulsive forces) are not from there: experiments/robots/icub_volumes.py has
+them.  The file names the meshes of the installed icub-models, which viewers draw.
 
 Usage: python -m experiments.robots.write_icub DATA.json [OUT.xml]
 """
@@ -109,9 +110,10 @@ def add_joints(parent: ET.Element, data: dict[str, Any], link: str, point: Array
 
 
 def add_joint(parent: ET.Element, data: dict[str, Any], joint: dict[str, Any], point: Array) -> None:
-    """Add a joint and the displacement before it, with shapes, fields, markers and children, to the XML element `parent`.
+    """Add a joint with all that it moves (mass, shapes, force fields, markers, further joints) to the XML element `parent`.
 
-    `data`: the JSON data.  `joint`: its entry in the data.  `point`: (3,) m, root frame at zero pose, origin of `parent`.
+    The joint is placed in a link element, which holds the displacement from `parent` to the joint.  `data`: the JSON data.  `joint`: its
+    entry in the data.  `point`: (3,) m, root frame at zero pose, origin of `parent`.
     """
     axis = np.array(joint["axis_root"])
     here = skeleton_point(joint["name"], np.array(joint["point_root"]), axis)
@@ -147,9 +149,10 @@ def add_joint(parent: ET.Element, data: dict[str, Any], joint: dict[str, Any], p
 def skeleton_point(name: str, point: Array, axis: Array) -> Array:
     """Return the point (3,) m on a joint's axis through which the body's skeleton is drawn.
 
-    It is the point nearest to the anchor of the joint's group in ANCHORS, which are positions in m, root frame at zero pose; without an
-    anchor, it is `point` itself.  `name`: name of the joint.  `point`, `axis`: (3,), a point on the axis and the unit vector of its
-    direction, root frame at zero pose.
+    ANCHORS has one position (m, root frame at zero pose) for a joint or for a group of joints, such as the shoulder; for the right arm, its
+    y is negated.  The returned point is the point of the axis nearest to this position.  For a joint without an entry in ANCHORS it is
+    `point`.  `name`: name of the joint.  `point`: (3,) m, a point on the axis.  `axis`: (3,), unit vector of its direction.  Both are in
+    the root frame at zero pose.
     """
     plain = name.removeprefix("l_").removeprefix("r_")
     key = next((key for key in (plain, plain.split("_")[0]) if key in ANCHORS), None)
@@ -212,8 +215,8 @@ def declare_motors(parent: ET.Element, data: dict[str, Any], part: str) -> None:
 def add_mass(parent: ET.Element, joint: dict[str, Any], point: Array) -> None:
     """Add the mass that moves with a joint to the XML element `parent`; positions are written relative to `point` (3,) m, root frame.
 
-    Fingers and eyes are left out: their 0.01 kg and 0.001 kg m^2 each are placeholders of the source. In its other model, which is
-    simulated, hand and head have the same mass without them.
+    Fingers and eyes get no mass: their values in icub-models, 0.01 kg and 0.001 kg m^2 each, are placeholders.  The simulator loads another
+    model of icub-models, without fingers and eyes; hand and head have the same mass there.
     """
     if "_hand_" in joint["name"] or "eye" in joint["name"]:
         return
@@ -223,9 +226,9 @@ def add_mass(parent: ET.Element, joint: dict[str, Any], point: Array) -> None:
 
 
 def add_shapes(parent: ET.Element, model: dict[str, Any], link: str, point: Array) -> None:
-    """Add the solids of a link to the XML element `parent`; positions are written relative to `point` (3,) m, root frame.
+    """Add the collision shapes of a link to the XML element `parent`; positions are written relative to `point` (3,) m, root frame.
 
-    `model`: the robot in the data.
+    `model`: the entry models.icub_v2_5 of the JSON data.  Links that are listed in BOXES get these boxes instead of the shapes in `model`.
     """
     for index, (low, high) in enumerate(np.array(BOXES.get(link, ())).reshape(-1, 2, 3)):
         width, height, depth = high - low
@@ -247,7 +250,10 @@ def add_shapes(parent: ET.Element, model: dict[str, Any], link: str, point: Arra
 
 
 def add_fields(parent: ET.Element, link: str, point: Array) -> None:
-    """Add the fields of a link to the XML element `parent`; positions are written relative to `point` (3,) m, root frame."""
+    """Add the force fields of a link (spheres and capsules that cause repulsive forces) to the XML element `parent`.
+
+    Positions are written relative to `point` (3,) m, root frame.
+    """
     for name, host, radius, first, second in fields():
         if host != link:
             continue
@@ -263,14 +269,18 @@ def add_fields(parent: ET.Element, link: str, point: Array) -> None:
 
 
 def fields() -> list[Field]:
-    """Return the fields of all links: name, link, radius [m], and both ends (3,) m of its axis, root frame at zero pose."""
+    """Return the force fields of all links (spheres and capsules that cause repulsive forces), each as a tuple.
+
+    The tuple is (name, link, radius [m], first end, second end).  The ends (3,) m of the capsule's axis are in the root frame at zero pose;
+    they are equal for a sphere.
+    """
     mirror = [(n, k, r, (a[0], -a[1], a[2]), (b[0], -b[1], b[2])) for n, k, r, a, b in LEFT_ARM]
     arms = [(f"l_{n}", f"l_{k}", r, a, b) for n, k, r, a, b in LEFT_ARM] + [(f"r_{n}", f"r_{k}", r, a, b) for n, k, r, a, b in mirror]
     return TRUNK + HEAD + arms
 
 
 def add_visuals(parent: ET.Element, model: dict[str, Any], link: str, point: Array) -> None:
-    """Add what viewers draw of a link to the XML element `parent`: the mesh that the URDF has for this link, or for hands, their solids.
+    """Add what viewers draw of a link to the XML element `parent`: the meshes of the URDF; for hands and fingers, the collision shapes.
 
     Positions are written relative to `point` (3,) m, root frame; the link has the same zero pose in the URDF. The URDF's mesh of a hand
     cannot be used: palm and fingers are one piece, so the fingers would not move.
@@ -322,8 +332,8 @@ def add_markers(parent: ET.Element, data: dict[str, Any], link: str, point: Arra
 def add_marker(parent: ET.Element, name: str, place: Array, rotation: Array, normal: Array) -> None:
     """Add one marker to the XML element `parent`.
 
-    `place`: (3,) m, relative to the origin of `parent`.  `rotation`: (3, 3), orientation of its frame.  `normal`: (3,); both in root axes
-    at zero pose.
+    `place`: (3,) m, relative to the origin of `parent`.  `rotation`: (3, 3), orientation of the marker's frame.  `normal`: (3,), the
+    direction in which the marker faces, out of a palm for instance.  Both are in root axes at zero pose.
     """
     rows = " ".join(number(value) for value in rotation.ravel())
     element(parent, "marker", name=name, rotation=rows, **vector("px py pz", place), **vector("nx ny nz", normal))

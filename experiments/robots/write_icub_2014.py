@@ -35,9 +35,9 @@ LISTED_LENGTH = 1.0  # in the data, of an element that the file gives no length
 class Tree:
     """The entry "mobee_original" of the JSON data, with dicts for look-ups.
 
-    `data`: the whole JSON data.  `nodes`: the links and joints, by id.  `motors`: motors by part.  `axis`: name of a motor in YARP, by its
-    name in the data.  `joints`: ids of the joints that a motor drives, by its name in YARP.  `links`: name of the link that a joint moves
-    in icub.xml, by the joint's name.
+    `data`: the whole JSON data.  `nodes`: id -> link or joint.  `motors`: part -> its motors.  `axis`: name of a motor in the data -> its
+    name in YARP.  `joints`: name of a motor in YARP -> ids of the joints that it drives.  `links`: name of a joint in the entry
+    models.icub_v2_5 -> name of the link that it moves.
     """
 
     def __init__(self, data: dict[str, Any]) -> None:
@@ -88,7 +88,10 @@ def declare_motors(parent: ET.Element, tree: Tree, part: str) -> None:
 
 
 def add_node(parent: ET.Element, tree: Tree, node: dict[str, Any]) -> None:
-    """Add a node of the data, a link or a joint, with its shapes, its markers and its children, to the XML element `parent`."""
+    """Add a link or a joint, with its shapes, markers and children, to the XML element `parent`.
+
+    `node`: the link or joint, an entry of "nodes" in the JSON data.
+    """
     if node["parent"] is not None and tree.nodes[node["parent"]]["body_part"] != node["body_part"]:
         part = next((old for old in parent.findall("bodypart") if old.get("name") == node["body_part"]), None)
         if part is None:
@@ -127,7 +130,8 @@ def add_node(parent: ET.Element, tree: Tree, node: dict[str, Any]) -> None:
 def joint_element(parent: ET.Element, tree: Tree, node: dict[str, Any], axis: Array) -> ET.Element:
     """Add a joint with its axis (3,), motor and interval to the XML element `parent`, and return the new element.
 
-    The link that the joint moves has the name that icub.xml gives to the link of this joint, or "<joint>_link" if icub.xml has none.
+    The joint moves a link.  If the iCub v2.5 (models.icub_v2_5 in the JSON data) has a joint with the same name, the link is named as the
+    one that that joint moves, as in icub.xml; otherwise it is named "<joint>_link".
     """
     name, motor = tree.joint_name(node), tree.axis[node["motor"]]
     here = element(parent, "joint", name=name, moves=tree.links.get(name, f"{name}_link"), motor=motor, **vector("x y z", axis))
@@ -144,8 +148,8 @@ def joint_element(parent: ET.Element, tree: Tree, node: dict[str, Any], axis: Ar
 def end_point(tree: Tree, node: dict[str, Any]) -> Array:
     """Return the point (3,) m, root frame at zero pose, at which a link ends.
 
-    It is the point of a child of the link, so that rounding errors do not add up along the tree; without children, it follows from the
-    length.
+    If the link has a child, it is the child's point in the data, so that rounding errors do not add up along the tree.  Otherwise it is
+    computed from the link's start point, direction and length; the placeholder length LISTED_LENGTH (1.0) counts as 0.
     """
     for child in tree.nodes.values():
         if child["parent"] == node["id"]:

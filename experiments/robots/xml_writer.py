@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Common code of both writers of robot files: numbers, elements and angles of boxes in the grammar of mobee/robot/robots/README.md."""
+"""Functions that both writers of robot files use: they format numbers, add XML elements, and compute the orientation attributes of boxes.
+
+The file format is described in mobee/robot/robots/README.md.
+"""
 
 from __future__ import annotations
 

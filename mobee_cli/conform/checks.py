@@ -93,7 +93,7 @@ def streams(player: Player, part: str) -> None:
 
 
 def ticks(player: Player, part: str) -> None:
-    """Test that numbers, times and rate of the ticks of 1.5 s are those of the contract; raises Broken otherwise.
+    """Record the ticks for 1.5 s, and test their numbers, times and rate by the contract; raises Broken if one of them is wrong.
 
     `part`: not used.
     """
@@ -183,7 +183,7 @@ def obeys(player: Player, part: str) -> None:
 
 
 def refuses(player: Player, part: str) -> None:
-    """Test that invalid commands and commands for an old tick do not come into force; raises Broken otherwise.
+    """Test that robot_sim ignores invalid commands, and commands that answer an old tick; raises Broken otherwise.
 
     `player`: the connection with robot_sim. `part`: part that the checks with commands use.
     """
@@ -230,15 +230,16 @@ def owner_gone(player: Player, part: str) -> None:
 
 
 def model_gone(player: Player, part: str) -> None:
-    """Test that all parts go into hold when the liveliness token of the model disappears; raises Broken otherwise.
+    """Test that all parts go into hold when the liveliness token of the service `model` disappears; raises Broken otherwise.
 
-    All parts are armed (they follow commands); in hold they stand still; `part` moves, and the others are commanded not to move.
+    Before that, all parts are armed, so that they follow commands: `part` is commanded to move, the others to stand still. A part in hold
+    brakes and stands still.
     """
     _hold_without(player, [part, *(name for name in player.robot.parts if name != part)], "model", owner=False)
 
 
 def emergency_stop(player: Player, part: str) -> None:
-    """Test that an emergency stop stops all parts and stays in force until the call that resets it; raises Broken otherwise."""
+    """Test that an emergency stop stops all parts, and that no part can be armed before the stop is reset; raises Broken otherwise."""
     with player.armed(part):
         player.keep(part, "velocity", lambda: _speed(player, part), MOTION)
         player.service.bus.publisher(EStop).put(set=True, source="conform", reason="test of the emergency stop")

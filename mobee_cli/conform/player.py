@@ -39,8 +39,8 @@ class Player:
     """Acts as the controller of a robot_sim under test, and records the messages that arrive.
 
     `ticks`: pairs of the monotonic time of arrival [s] and the `Tick` message. `clocks`, `stops`: the `Clock` and `EStop` messages.
-    `states`: lists of `State` messages, by part. `refused`: texts about messages that are not valid. `epochs`: epoch (number of the
-    ownership) of each part's drive that is in force, by part.
+    `states`: lists of `State` messages, by part. `refused`: texts about messages that are not valid. `epochs`: newest epoch of each
+    part, by part; every `take` of a part gives the ownership a new number, the epoch.
     """
 
     def __init__(self, service: Service, robot: Robot) -> None:
@@ -139,14 +139,17 @@ class Player:
     def drive(self, part: str, verb: str, epoch: int | None = None) -> str:
         """Call arm, release or hold (`verb`) for the drive of a part, and return the new state of its gate.
 
-        `epoch`: number of the ownership; None: the number in force.
+        `epoch`: number of the ownership; None: the number that the last `take` of this part returned.
         """
         epoch = self.epochs[part] if epoch is None else epoch
         return self.call(keys.drive(part, verb), WithEpoch, Driven, epoch=epoch).gate
 
     @contextmanager
     def armed(self, part: str) -> Iterator[None]:
-        """Take and arm a part for the block of a `with` statement, and release it at the end. Raises Broken if it is not armed."""
+        """Become the owner of a part and arm it (it follows commands), for the block of a `with` statement; release it at the end.
+
+        Raises Broken if robot_sim does not arm the part.
+        """
         self.take(part)
         gate = self._armed_when_known(part)
         if gate != "armed":

@@ -56,10 +56,10 @@ class Learning:
     def numbers(self) -> dict[str, Any]:
         """Return the numbers of the learning so far, as plain JSON data.
 
-        "transitions", "transitions_ever": number made by this process, and with those of earlier processes. "robot_time_s", "real_time_s":
-        simulated and real time. "touched": number of actions that ended in contact with each object, by name. "agents": for each part, a
-        dict with "joints" (names), "states", "state_actions", "tried" (state-actions that were tried), "missed_goal" (state-actions that
-        missed their goal at least once) and "transitions".
+        These are of this process only: "transitions": number of transitions. "robot_time_s": simulated time. "real_time_s": real time. The
+        other numbers include earlier processes: "transitions_ever": number of all transitions. "touched": number of actions that ended in
+        contact with each object, by name. "agents": for each part, a dict with "joints" (names) and the numbers "states", "state_actions",
+        "tried" (state-actions that were tried), "missed_goal" (state-actions that missed their goal at least once) and "transitions".
         """
         return {
             "transitions": self.transitions,
@@ -112,8 +112,8 @@ def _of_agent(agent: CuriousAgent) -> dict[str, Any]:
 def opened(setup: Setup, robot: Robot, store: Path) -> Iterator[Learning]:
     """Create the agents of a setup on an offline plant, for the block of a `with` statement. Raises MobeeError if this is not possible.
 
-    `robot`: the robot as the live system reads it from its file, so that both have exactly the same state spaces. `store`: file of the
-    transitions. Transitions that it already contains are learned first.
+    `robot`: the robot, loaded from the same file or name as in the live system, so that offline and live learning have exactly the same
+    state spaces. `store`: file of the transitions. The agents first learn the transitions that it already contains.
     """
     world = world_around(setup.world, setup.shipped or store)
     dt = next((tick for tick in TICKS if tick < largest_step(robot, setup.law)), TICKS[-1])
@@ -129,10 +129,11 @@ def opened(setup: Setup, robot: Robot, store: Path) -> Iterator[Learning]:
 
 
 def learn(learning: Learning, seconds: float | None, transitions: int | None, say: Callable[[str], None]) -> None:
-    """Let the agents learn for a real time (`seconds`), or until the file contains a total number of `transitions`.
+    """Let the agents learn until one of two limits is reached.
 
-    None: no such limit; if both are given, learning ends at the first one. On a terminal a progress bar is shown; `say` is called with each
-    report.
+    `seconds`: real time of learning [s]; None: no limit of time. `transitions`: total number of transitions in the file of the agents;
+    None: no limit of transitions. `say`: called with the text of each report, the first after 5 min of robot time. On a terminal a progress
+    bar is shown.
     """
     start, following = time.monotonic(), FIRST_REPORT
     with Progress() as progress:

@@ -31,9 +31,11 @@ PUBLISHED = ("torso", "left_arm", "right_arm")  # the parts that learn in thesis
 class Setup:
     """A robot and its agents.
 
-    `name`: name for files and titles. `shipped`: name under which the robot is loaded; empty: it is written to a file of its own. `world`:
-    name or path of the world, or "none". `gains`: name of the gains. `agents`: settings of each agent, by part. `lines`: description for
-    the user. `cameras`: cameras on links, beside those of the robot. `eyes`: services that make and read pictures.
+    `name`: name for files and titles. `shipped`: name of the shipped robot; empty: the robot is written to a file of its own. `world`: name
+    or path of the world, or "none". `gains`: name of the gains of the control law, as `Gains.named` takes it. `agents`: settings of each
+    agent, by part. `lines`: lines of text that describe the robot and its agents to the user. `cameras`: texts of the options --camera, for
+    cameras in addition to those in the robot's file. `eyes`: names of the services for cameras, "renderer" and "vision", that the live
+    system needs.
     """
 
     name: str

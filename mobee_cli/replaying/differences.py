@@ -25,8 +25,9 @@ _LEFT_OUT = ("Clock", "StepDone", "Turn", "Served", "State")  # of them, those t
 class Difference:
     """The first difference between two messages with the same key and tick.
 
-    `field`: path of the field, or "message". `first`, `second`: its value in each recording; the text "missing" if that recording does not
-    contain the message or field.
+    `field`: path of the field in the message, such as "q[3]"; "message" if one recording does not contain the message. `first`, `second`:
+    value of the field in each recording; the text "missing" if that recording does not contain the message or field. If the recordings
+    do not have the same ticks, `key` is "tick", `field` is "k", and `first` and `second` are the numbers of the ticks.
     """
 
     tick: int

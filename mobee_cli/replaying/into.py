@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Plays a recorded run in lockstep into its controller or model, and compares the new messages with the recorded ones, to the last bit.
 
-In every tick the service receives the recorded input. The recording also gives the order of the calls: a call that the service had answered
-before it answered the tick is made before the tick, any other call after it. All messages from the recording have their recorded bytes. The
-only exception are the epochs of goals, the numbers of their ownerships: a controller counts them from its start, so the recorded epochs are
-translated.
+In every tick the service receives the recorded input. The recording also gives the order of the calls. If the service had answered a call
+before it answered the tick, the call is made right after the tick is sent. All other calls are made after the service has answered the
+tick.
+
+Messages are sent with their recorded bytes. Only the epochs of goals are different. An epoch is the number of one ownership of a part's
+goal, and a controller counts epochs from its start. So the replay replaces the recorded epochs in calls, and in the recorded `Motion`
+messages before it compares them.
 """
 
 from __future__ import annotations
@@ -35,9 +38,9 @@ _NO_INPUT = ("/rpc/mark", "/rpc/shutdown")  # calls that change no result
 class Role:
     """The messages that a service reads and sends in a tick, as names of message types.
 
-    `with_tick`: messages of the model without which the service cannot answer a tick; they are played right after the tick. `after`:
-    messages of other services, played before the next tick. `says`: messages of the service that are compared. `answers`: function that
-    returns whether a message is the service's answer to a tick.
+    `with_tick`: messages of the model that the service needs before it can answer a tick; they are sent after the tick. `after`: messages
+    of other services; they are sent when the service has answered the tick. `says`: messages that the service sends, and that are compared
+    with the recorded ones. `answers`: function that returns whether a message is the service's answer to a tick.
     """
 
     with_tick: tuple[str, ...]
@@ -60,8 +63,9 @@ ROLES: Mapping[str, Role] = {
 class Result:
     """The result of a replay into a service.
 
-    `who`: the service. `ticks`: number of compared ticks. `messages`: number of compared messages. `says`: number of compared messages
-    by type. `calls`: number of repeated calls. `seconds`: real time [s]. `difference`: the first difference; None: all messages are equal.
+    `who`: the service. `ticks`: number of compared ticks. `messages`: number of compared messages. `calls`: number of
+    recorded calls that were made again. `seconds`: real time of the replay [s]. `difference`: the first difference; None: all messages are
+    equal. `says`: number of compared messages of each type, by the name of the type.
     """
 
     who: str

@@ -48,7 +48,8 @@ class Player:
     def play(self, speed: float) -> None:
         """Publish all messages of the recording.
 
-        `speed`: factor by which the replay is faster than the robot's time in the recording. Pauses of the robot are skipped.
+        `speed`: seconds of the robot's time that are replayed in one second; 1: real time. If the robot was paused, its time stood still,
+        so the replay does not wait there.
         """
         self.stage.serve(keys.world_rpc("list"), lambda key, request: (World, self._world))
         begin, first = time.monotonic(), -1

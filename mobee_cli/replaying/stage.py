@@ -53,9 +53,10 @@ class Stage:
 
     @contextmanager
     def open(self, endpoint: str) -> Iterator[Self]:
-        """Open the bus, with a router at `endpoint` or at a local socket, for the block of a `with` statement.
+        """Open the bus, with a router of its own, for the block of a `with` statement. At the end of the block the service is stopped.
 
-        At its end the service is stopped.
+        The router listens at a Unix socket. It listens at `endpoint` only if the system has no such sockets, or the socket's path is too
+        long.
         """
         spare_threads()
         with local_endpoint() as local, open_router(local or endpoint, lease=PATIENCE) as session:
@@ -116,7 +117,7 @@ class Stage:
             self._tokens.pop((who, instance)).undeclare()
 
     def serve(self, key: str, answer: Callable[[str, dict[str, Any]], tuple[type[msgspec.Struct], bytes] | None]) -> None:
-        """Answer calls of the service.
+        """Answer the calls that the service makes to other services.
 
         `key`: key expression of the calls. `answer(key, request)` returns the type and the bytes of the reply, or None: no answer.
         """

@@ -74,10 +74,11 @@ class TickOf:
 
 
 def ticks(recording: Recording) -> Iterator[TickOf]:
-    """Yield the ticks of the first run of a recording, in order. Raises MobeeError if the recording contains no tick.
+    """Yield the ticks of a recording, in order. Raises MobeeError if the recording contains no tick.
 
-    A message that has no tick of this run, such as a liveliness token or an emergency stop of a client, is added to the newest tick before
-    it. The last tick is left out, because it may be incomplete.
+    If robot_sim was started again during the recording, only the ticks of its first run are yielded. Some messages belong to no run, such
+    as a liveliness token or an emergency stop of a client; they are added to the newest tick that was recorded before them. The last tick
+    is left out, because it may be incomplete.
     """
     run, newest, waiting = "", 0, {0: TickOf(0)}
     last = -1  # tick that was yielded
@@ -115,7 +116,7 @@ def _header_of(message: Raw) -> _Header:
 
 
 def served_of(message: Raw) -> Served | None:
-    """Decode a message of type Served, which describes a call and its reply; None if it cannot be decoded (no service has sent it)."""
+    """Decode a message of type Served, which describes a call and its reply; return None if the message cannot be decoded."""
     try:
         return msgspec.msgpack.decode(message.payload, type=Served)
     except UNDECODABLE:

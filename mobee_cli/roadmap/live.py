@@ -46,8 +46,8 @@ TRIES = 3
 class Running:
     """The running system, to which this program is connected.
 
-    `robot`: the robot of the system. `world`: objects in the world of its model. `gains`: gains of its controller. `service`: this
-    program's connection to the bus.
+    `robot`: the robot of the system. `world`: copy of the world in the system's model service. `gains`: gains of the system's controller.
+    `service`: this program's connection to the bus.
     """
 
     robot: Robot
@@ -104,8 +104,8 @@ def _played(plant: BusFollower, running: Running, found: dict[str, Any], speed: 
 def in_running_world(trm: Roadmap, running: Running, other_world: bool) -> Roadmap:
     """Return the roadmap with the world of the running system in place of its own.
 
-    Raises UserError if the robots differ, or if the obstacles differ and `other_world` is False. Targets may be at other places, because
-    vision moves them; the path is checked for contacts at their present places.
+    Raises UserError if the robots differ, or if the obstacles differ and `other_world` is False. Only obstacles are compared: targets may
+    have moved since the roadmap was built. A path through the returned roadmap is checked for contacts with the objects where they are now.
     """
     made, now = robot_digest(trm.model.robot), robot_digest(running.robot)
     if made != now:

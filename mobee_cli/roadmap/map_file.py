@@ -55,8 +55,9 @@ def map_given(arguments: argparse.Namespace) -> Roadmap:
 def start_of(trm: Roadmap, given: list[float] | None) -> Array:
     """Return the posture (n,) rad in which a path begins.
 
-    `given`: None: the robot's home; task coordinates: the posture of the vertex for this place; n angles [rad]: this posture. Raises
-    UserError if the numbers are not valid.
+    `given`: None: the path begins at the robot's home. As many numbers as the task has coordinates: these are task coordinates, and the
+    path begins at the nearest vertex of the roadmap. n numbers: angles of all motors [rad]. Raises UserError for another count of numbers
+    or an angle beyond the limits, InvalidValue if no vertex is within 1.5 spacings of the task coordinates.
     """
     robot = trm.model.robot
     if given is None:
@@ -131,9 +132,9 @@ def edge_summary(trm: Roadmap) -> list[str]:
 def as_json(trm: Roadmap, path: Path) -> dict[str, Any]:
     """Return a description of a roadmap as plain JSON data. `path`: path of the roadmap's file.
 
-    "poses", "edges": number of poses and of edges. "parts": number of poses of each connected component. "names", "spacing", "low", "high":
-    name, distance between vertices, smallest and largest value of each task coordinate. "settings": settings with which the roadmap was
-    built.
+    "poses", "edges": how many poses and edges it has. "parts": number of poses of each connected component. The next four are lists with
+    one value for each task coordinate. "names": its name. "spacing": the distance between vertices. "low", "high": its smallest and its
+    largest value over all poses; None without poses. "settings": settings with which the roadmap was built.
     """
     return {
         "map": str(path),

@@ -104,11 +104,14 @@ def result_of(trm: Roadmap, path: dict[str, Any], played: Played, tolerance: flo
     """Return the result of a motion as plain JSON data; lengths in m, angles in rad, times in s.
 
     `path`: as returned by `mobee_cli.roadmap.query.find_path`. `tolerance`: largest remaining error of the marker [mm] at which the robot
-    has arrived. Keys of the result: "place": task coordinates of the last vertex of the path. "remaining_error": distance of the roadmap's
-    marker from its goal; "markers": the same of every marker. "rested": whether the robot came to rest. "lag": largest distance of a motor
-    from its planned position at the same time; "off": from the nearest planned pose; "missing": from its goal at the end. "solid", "field":
-    depth of the deepest contact of solids, and of fields (volumes that cause repulsive forces). "touched": names of the pairs in the
-    deepest solid contact.
+    has arrived.
+
+    Keys of the result: "place": task coordinates of the last vertex of the path. "remaining_error": distance of the roadmap's marker from
+    its goal; "markers": the same distance for every marker, by name. "rested": whether the robot came to rest. The next three are largest
+    distances over all motors that the plan moves. "lag": between the real and the planned position at the same time. "off": between the
+    real pose and the nearest planned pose, of any time. "missing": between the last position and the goal. "solid": depth of the deepest
+    contact of solids. "field": the same of fields (volumes that cause repulsive forces). "touched": all pairs of solids in contact in the
+    pose with the deepest solid contact.
     """
     pose = trm.model.evaluate(np.array([played.q[-1], path["poses"][-1]]))
     markers = {name: float(np.linalg.norm(np.diff(pose.position(name), axis=0))) for name in trm.model.robot.markers}
@@ -132,9 +135,10 @@ def result_of(trm: Roadmap, path: dict[str, Any], played: Played, tolerance: flo
 
 
 def held_off(trm: Roadmap, path: dict[str, Any], played: Played, gains: Gains) -> dict[str, Any]:
-    """Return which motor ended farthest from its goal, and which force kept it away, as {"farthest": motor, "held_by": name of the force}.
+    """Return the motor that ended farthest from its goal, and the strongest constraint force on it in the last pose.
 
-    "held_by" is None if no constraint force on this motor exceeds 0.5 rad/s^2. `path`: as returned by `mobee_cli.roadmap.query.find_path`.
+    Keys of the result: "farthest": name of the motor, one that the path moves. "held_by": "its limit", "a constraint of the robot" or "a
+    field in contact"; None if no such force exceeds 0.5 rad/s^2. `path`: as returned by `mobee_cli.roadmap.query.find_path`.
     """
     off = np.abs(played.q[-1] - path["poses"][-1]) * (np.ptp(path["poses"], axis=0) > 0.0)
     motor = int(off.argmax())

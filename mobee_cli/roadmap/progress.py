@@ -61,7 +61,7 @@ class Progress:
         self._phase = "over"
 
     def end(self) -> None:
-        """Publish that the motion is over; if `rest` was not called, that it was interrupted."""
+        """Publish the end of the motion: it is "over" if `rest` was called before, otherwise "interrupted"."""
         if self._fixed:
             self._put(self._phase)
 

@@ -46,15 +46,16 @@ def run(arguments: argparse.Namespace) -> int:
 def find_path(trm: Roadmap, start: Array, goal: list[float]) -> dict[str, Any]:
     """Return the shortest path without contacts as plain JSON data.
 
-    If there is none, return the shortest path with contacts, and the reason. `start`: posture (n,) rad. `goal`: task coordinates. Motors
-    that the roadmap does not move stay where they are, if they are less than 0.25 rad from their positions in the roadmap. Raises UserError
-    if the roadmap has no path at all.
+    If there is none, return the shortest path with contacts, and the reason. `start`: posture (n,) rad. `goal`: task coordinates. A motor
+    that the roadmap does not move stays where it is if it is less than 0.25 rad from its position in the roadmap; otherwise the path moves
+    it to this position. Raises UserError if the roadmap has no path at all.
 
     Keys of the result: "vertices": indices of the path's vertices. "place": task coordinates of the last one; "missing": its distance from
     the goal in each task coordinate, in multiples of the distance between vertices. "poses": (K, n) rad, from the start. "length": length
-    of the path [rad]. "entry": largest motor angle from the start to the first vertex [rad]. "largest_step": largest motor angle between
-    two poses [rad]. "seconds": duration of the motion. "shortest": whether no path with contacts is shorter. "free": False if the path has
-    contacts; "why": then the reason, otherwise empty.
+    of the path [rad]. "entry": largest angle by which a motor turns from the start to the first vertex [rad]. "largest_step": largest angle
+    by which a motor turns from one pose to the next [rad]. "seconds": duration of the motion [s]. "shortest": whether the path is also the
+    shortest one if contacts are ignored. "free": False if the path has contacts. "why": the reason if no path without contacts was found,
+    otherwise empty.
     """
     shortest = _shortest(trm, start, goal)
     stay = np.abs(start - trm.q[shortest[0]]) < NEAR_TURN

@@ -76,9 +76,10 @@ def _draw(trm: Roadmap, marker: str, path: Path) -> Path:
 
 
 def marker_of(trm: Roadmap) -> str:
-    """Return the marker that the task's coordinates name, or else the one that moves farthest between the poses.
+    """Return the marker of a roadmap's task: the name of one of the task coordinates begins with the name of this marker.
 
-    Raises UserError if the robot has no markers.
+    If there is no such marker, return the one whose position varies most between the poses, or the robot's first marker if the roadmap has
+    no poses. Raises UserError if the robot has no markers.
     """
     robot = trm.model.robot
     if not robot.markers:
@@ -94,9 +95,10 @@ TOUR_PLACES = 8
 
 
 def tour(trm: Roadmap, places: int = TOUR_PLACES) -> list[Stretch]:
-    """Return a tour through the roadmap as sections of a motion; each section is a path from one place to another that is far away.
+    """Return a tour through the roadmap as sections of a motion; each section is a path from one pose of the tour to the next.
 
-    The tour stays in the largest connected component of the roadmap, and begins at its middle. `places`: number of places.
+    The tour stays in the largest connected component of the roadmap. It begins at the pose nearest to the mean of the task coordinates.
+    Each next pose is the one that is farthest, in task space, from all poses chosen before. `places`: number of chosen poses.
     """
     from services.monitor.viewer.view import RATE, Stretch  # imports rerun
 

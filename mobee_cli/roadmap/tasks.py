@@ -72,7 +72,8 @@ def task_named(name: str, options: Sequence[str], model: Callable[[], Model]) ->
     Args:
         name: name of a shipped task, or path of a .py file.
         options: options for robot and world as given on the command line; a shipped task allows none.
-        model: makes the model of these options.
+        model: function that returns the model of the robot and the world in the options. It is called only if the function `example` of a
+            task file has a parameter.
 
     Raises:
         UserError: the name or the file is not valid.

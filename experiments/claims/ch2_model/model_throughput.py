@@ -183,9 +183,10 @@ def read_flood(path: Path) -> list[Record]:
 def results(records: list[Record], arguments: argparse.Namespace) -> dict[str, Any]:
     """Return a dict from the robot to its measured rates, and under "complete" whether every robot was measured up to --objects objects.
 
-    Keys of each robot: "evaluations_per_second_flooded" and "evaluations_per_second_still", dicts from a number of objects to the rate with
-    and without edits; "edits_per_second"; "objects_reached", the largest number of objects; and, only if the edits lasted less than
-    MIN_SECONDS (0.2 s), "note", a text that says that this is too short for a rate.  `arguments`: the options of the run.
+    Keys of each robot: "evaluations_per_second_flooded" (with edits) and "evaluations_per_second_still" (without edits), each a dict from
+    the number of objects to the rate; "edits_per_second"; "objects_reached", the largest number of objects; and "note", only if all edits
+    together lasted less than MIN_SECONDS (0.2 s): a text that says that this time is too short to measure a rate.  `arguments`: the options
+    of the run.
     """
     found: dict[str, Any] = {}
     for robot in arguments.robots:
@@ -207,9 +208,10 @@ def results(records: list[Record], arguments: argparse.Namespace) -> dict[str, A
 def rates(records: Iterable[Record]) -> Iterator[tuple[int, int]]:
     """Yield pairs (number of objects, evaluations per second), one for each of the numbers 0, 1, 2, 5, 10, ... 1000 (NUMBERS).
 
-    A number that was not measured is left out.  Records within 10 % of the number are pooled.  If they last less than MIN_SECONDS (0.2 s),
-    the next nearest records are added; if the mean number of objects then differs by more than 10 %, this mean is yielded instead of the
-    number.  A number is also left out if all records together last less than MIN_SECONDS.
+    A rate is computed from all records whose number of objects differs from the number in NUMBERS by at most 10 %.  If these records
+    together cover less than MIN_SECONDS (0.2 s), the next nearest records are added.  If the mean number of objects of the records then
+    differs by more than 10 %, this mean is yielded instead of the number.  A number is left out if no record has exactly this number of
+    objects, or if all records together cover less than MIN_SECONDS.
     """
     known = list(records)
     for number in NUMBERS:

@@ -54,13 +54,13 @@ MIN_SECONDS = 60.0  # s, shortest time for a slope
 class Editor:
     """Edits a world at random from one thread: objects of its own, and objects that all threads share.
 
-    It makes only valid edits of its own objects, so the world may refuse none of them.  `edits`: number of edits.  `refused`: number of
-    refused edits of shared objects; these refusals are allowed.  Two of its own objects are witnesses of the order of edits: the editor
-    always moves the first one by a step, then the second.
+    It makes only valid edits of its own objects, so the world must accept all of them.  `edits`: number of edits.  `refused`: number of
+    refused edits of shared objects; these refusals are allowed.  Two of its own objects, the witnesses, make the order of edits visible:
+    the editor always moves the first one by a step, then the second.
 
     Args:
         world, robot: the world to edit, and the robot to whose links objects are attached.
-        shipped: short name of the robot, which selects where the boxes are.
+        shipped: short name of the robot ("icub" or "katana"); the boxes are placed within reach of this robot.
         number: of the thread, from 0.
         seed: of the random edits.
     """
@@ -181,10 +181,11 @@ class WatchedWorld(World):
 
 
 def torn_table(snapshot: Snapshot) -> str | None:
-    """Return a text that says how the tables of a snapshot contradict its objects (then the snapshot is torn); None if they agree exactly.
+    """Return a text that names the first difference between the tables of a snapshot and its objects; None if they agree exactly.
 
-    A snapshot is an unchanging copy of the world.  The compared tables are the names, the roles, the names of attached objects, and the
-    numbers that describe the volumes.  All objects must be boxes.
+    A snapshot is an unchanging copy of the world.  It is torn if its tables do not belong to its objects.  The compared tables are the
+    names, the roles, the names of attached objects, and the rows that describe the volumes (shape, size and pose).  All objects must be
+    boxes.
     """
     things = list(snapshot.objects.values())
     if not snapshot.names == tuple(snapshot.objects) == tuple(thing.name for thing in things):
@@ -225,7 +226,10 @@ def other_objects(pose: Pose, snapshot: Snapshot) -> str | None:
 
 
 class Reference:
-    """A second model of the robot, whose world a single thread rebuilds from a snapshot to check an evaluation."""
+    """A second model of the robot, which checks evaluations.
+
+    For a check, a single thread rebuilds the world of this model from a snapshot.
+    """
 
     def __init__(self, robot: Robot) -> None:
         self._model = Model(robot)
@@ -358,12 +362,12 @@ class Endurance:
         """Return the counts and results of the run.
 
         "passed": whether there was an evaluation, the checks found no error, no exception was raised, and the memory grew by less than
-        MAX_SLOPE (0.5 MB/min).  "torn": dict from the text of an error that the checks found in an evaluation (it does not fit one
-        consistent state of the world) to how often it occurred.  "exceptions": the same, for tracebacks.  "slope_mb_per_minute": growth of
-        the memory; None if the run was too short, then it is not judged.  "threads", "evaluations" and "edits": numbers.
-        "compared_with_a_world_built_anew": number of evaluations that were compared with a second model.  "refused_as_they_must_be": number
-        of refused edits of objects that the threads share.  "resident_mb": dict of the "first" and "last" memory [MB]; None if it is not
-        known.
+        MAX_SLOPE (0.5 MB/min).  "torn": dict from the text of an error that the checks found to how often it occurred; the error means that
+        an evaluation did not use one consistent state of the world.  "exceptions": dict from a traceback to how often it occurred.
+        "slope_mb_per_minute": growth of the memory; None if the run was too short to measure it; then "passed" does not depend on it.
+        "threads", "evaluations" and "edits": their numbers.  "compared_with_a_world_built_anew": number of evaluations that were compared
+        with a second model.  "refused_as_they_must_be": number of refused edits of objects that the threads share; these refusals are
+        allowed.  "resident_mb": dict of the "first" and "last" memory [MB]; None if it is not known.
         """
         slope = slope_mb_per_minute(*zip(*self.samples, strict=True)) if self.samples else None
         is_sound = not self.judge.torn and not self.exceptions and self.moving.evaluations > 0
@@ -393,8 +397,8 @@ def endure(folder: Path, *, threads: int, duration: float, seed: int) -> dict[st
     """Run the endurance test with `threads` editing threads for `duration` s, and return its counts and results.
 
     Keys: "seconds", the duration, and those of `Endurance.verdict`, among them "passed".  The run ends early if the model raises an
-    exception.  A row per second is written to endurance.csv in `folder`, which is deleted first if it exists.  `seed`: of the boxes, the
-    edits and the motion.
+    exception.  A row per second is written to endurance.csv in `folder`; an older endurance.csv is deleted first.  `seed`: of the boxes,
+    the edits and the motion.
     """
     path = folder / ENDURANCE
     path.unlink(missing_ok=True)  # an interrupted endurance run starts again

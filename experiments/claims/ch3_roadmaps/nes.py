@@ -8,8 +8,8 @@ A task is a function (sphere, ellipsoid and cigar of condition 1e6, Rosenbrock) 
 rotation and its own start in [-1, 1], the same for all strategies; the initial standard deviation is 0.5.  The evaluations until f < 1e-8
 are counted; a run that does not reach this counts as 400 000.  Strategies: xNES and SNES as published (Glasmachers 2010, Schaul 2011), the
 library's default (xNES with CMA-ES's path, weights and rates), and CMA-ES by its author, all with their default populations.  "Outperforms
-on some tasks": fewer evaluations on at least one of the twelve tasks, by confidence intervals with a twelfth of the error rate each
-(Bonferroni).  "Comparable": the evaluations over those of CMA-ES, median over the tasks, are at most 1.5.
+on some tasks": fewer evaluations on at least one of the twelve tasks.  Each of these comparisons uses a confidence interval with a twelfth
+of the error rate (Bonferroni).  "Comparable": the number of evaluations, divided by that of CMA-ES, is at most 1.5 (median of the tasks).
 """
 
 from __future__ import annotations
@@ -57,11 +57,11 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Search for the minimum of a test function with one strategy, and return how long it took.
+    """Search for the minimum of a test function with one strategy, and return how many evaluations it needed.
 
     `settings`: name of the strategy and of the function, number of dimensions, and the limit "most" of evaluations.  `seed`: of the random
-    numbers.  Keys of the result: "evaluations", the number needed, at most "most"; "found", whether the minimum was found; "us", own
-    processor time of the strategy per evaluation [us].
+    numbers.  Keys of the result: "evaluations", the number needed, at most "most"; "found", whether the minimum was found; "us", processor
+    time of the strategy per evaluation, without the time of the function [us].
     """
     most = settings["most"]
     evaluations, us = search(settings["strategy"], settings["function"], settings["dimensions"], seed, most)
@@ -69,7 +69,7 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def evaluations(found: Cells) -> Runs:
-    """Return a dict from (strategy, task) to how many evaluations each of its searches needed, (seeds,), in the order of the seeds.
+    """Return a dict from (strategy, task) to the numbers of evaluations that the searches needed, (seeds,), sorted by seed.
 
     A task is a pair: the name of a function, and the number of dimensions.
     """
@@ -87,7 +87,7 @@ def findings(found: Cells) -> dict[str, Any]:
     """Return the results of the sweep.
 
     Keys: "evaluations", a dict from "function, dimensions" to a dict from the strategy to the evaluations, as text; "found", a dict from
-    the strategy to the share of successful runs; "claims", a list with the judged claims, as dicts (`Claim.record`).
+    the strategy to the number of successful runs, as text; "claims", a list with the judged claims, as dicts (`Claim.record`).
     """
     runs = evaluations(found)
     return {

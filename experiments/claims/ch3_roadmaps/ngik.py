@@ -105,8 +105,8 @@ def solvers(found: Cells) -> Solvers:
 def findings(found: Cells) -> dict[str, Any]:
     """Return the results of the sweep.
 
-    Keys: "solvers", a dict from "solver, number of motors" to a line of text with the share of reached targets, evaluations and time;
-    "claims", a list with the judged claims, as dicts (`Claim.record`).
+    Keys: "solvers", a dict from "solver, number of motors" to a line of text with the share of the targets that were reached, the number of
+    evaluations per target, and the processor time per target [ms]; "claims", a list with the judged claims, as dicts (`Claim.record`).
     """
     known = solvers(found)
     rows = {f"{name}, {motors} motors": str(solver) for (name, motors), solver in sorted(known.items())}

@@ -77,10 +77,10 @@ class Job(Struct, frozen=True):
 class Acted(Struct, frozen=True):
     """A motion of the arm along an edge of the roadmap.
 
-    Ticks are those of the simulator, robot_sim.  `vertex`: the goal.  `asked`: tick of the request.  `commanded`: first tick in which a
-    command that was computed after the request was in force.  `bump`: tick at which the model first reported that the arm touches the ball;
-    -1: never.  `ended`: tick at which the end of the motion was received.  `thinking`: processor time [s] from the end of the previous
-    motion to this request.
+    Ticks are those of the simulator, robot_sim.  `vertex`: the goal.  `asked`: tick of the request.  `commanded`: first tick in which the
+    motors execute a command that was computed after the request.  `bump`: tick at which the model first reported that the arm touches the
+    ball; -1: never.  `ended`: tick at which the end of the motion was received.  `thinking`: processor time [s] from the end of the
+    previous motion to this request.
     """
 
     vertex: int
@@ -181,7 +181,8 @@ class Crosser:
     def turn(self, solid: bool) -> None:
         """Make the ball solid or a ghost in the model, and place it in the simulator or remove it out of reach.
 
-        In free mode, where ticks follow the clock, this does not wait for the answers; raises MobeeError if a service refuses.
+        In lockstep this waits for the answers of the model and the simulator; raises CallFailed if one of them refuses.  In free mode
+        (ticks follow the clock) this does not wait; MobeeError is raised later, when a refusal arrives.
         """
         role, place = "obstacle" if solid else "ghost", self._place if solid else AWAY
         if self._service.locked:
@@ -207,14 +208,14 @@ class Crosser:
 class ContactStopPlant(BusPlant):
     """A BusPlant whose actions end when the model reports that the part begins to touch one of some objects.
 
-    Such an action ends early, and its outcome is not settled.  In lockstep (every tick waits for all participants) the plant receives no
-    ticks while its part moves.  Therefore a second service of the same process, the watcher, takes part in every tick.  It answers a tick
-    when the plant has processed the forces of that tick, so that the plant reacts to them in the same tick.
+    Such an action ends early, and `settled` of its outcome is False.  In lockstep (every tick waits for all participants) the plant
+    receives no ticks while its part moves.  Therefore a second service of the same process, the watcher, takes part in every tick.  It
+    answers a tick when the plant has processed the forces of that tick, so that the plant reacts to them in the same tick.
 
     Args:
         service, robot, part: see BusPlant.
         objects: names of the objects.  Overlap with a field, the larger volume around a link that is not solid, also counts as touch.
-        watcher: second service of this process, which shares the inbox of the first; None in free mode, where ticks wait for nobody.
+        watcher: second service of this process; both services put their messages into one inbox.  None in free mode (ticks do not wait).
     """
 
     def __init__(self, service: Service, robot: Robot, part: str, objects: Collection[str], watcher: Service | None = None) -> None:
@@ -244,7 +245,11 @@ class ContactStopPlant(BusPlant):
         return super().act(part, target)
 
     def leave(self) -> None:
-        """Release all goals and, in lockstep (every tick waits for all participants), end the participation of both services."""
+        """Release all goals.
+
+        In lockstep (every tick waits for all participants), also report that later ticks need not wait for this service and for the
+        watcher.
+        """
         super().leave()
         if self._watcher is not None:
             self._watcher.done(max(self._watched, 0), last=True)

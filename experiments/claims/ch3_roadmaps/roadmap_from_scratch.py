@@ -11,8 +11,8 @@ with motor parameters that were identified on PyBullet; with `--live` also the r
 as reached when every joint is within 0.15 rad of it; after a failed edge the arm moves back.  The next target is a vertex, drawn in
 proportion to its number of untried edges.  When no untried edge can be reached any more, RRT-Connect plans a path to a vertex with untried
 edges, up to three times per vertex.  At the end another plant tries every tried edge once more, from rest at its vertex, to see whether the
-results agree.  The depths of solid contacts count only for the pairs that the simulator tests; offline the model measures them, from the
-true joint positions every 0.1 s, and live PyBullet, in every tick.
+results agree.  The depths of solid contacts are measured only for pairs that the simulator tests: offline by the model, from the true joint
+positions every 0.1 s, and live by PyBullet, in every tick.
 """
 
 from __future__ import annotations
@@ -110,10 +110,10 @@ def explorer(plant: Plant, seed: int, store: MapStore | None = None) -> MapExplo
 
 
 class Depth:
-    """Records the deepest solid contact of a plant, among pairs that the simulator tests too.
+    """Records the deepest solid contact of a plant.
 
-    It is computed by the model from the true positions of the motors every 0.1 s.  `deepest`: its depth [m].  `pair`: names of the two
-    shapes.
+    Contacts between links are left out if the simulator does not test this pair of links.  The depth is computed by the model from the true
+    positions of the motors every 0.1 s.  `deepest`: the depth [m].  `pair`: names of the two shapes.
     """
 
     def __init__(self, plant: OfflinePlant) -> None:
@@ -164,8 +164,8 @@ def outcome(roadmap: AdaptiveRoadmap, repairs: int) -> dict[str, Any]:
 def agreement(roadmap: AdaptiveRoadmap, seed: int) -> Array:
     """Try each tried edge once more from rest at its vertex, on a new offline plant, and return which results are the same as before.
 
-    The array (E,) has a value for each of the E tried edges, by vertex and then by edge: True if both this try and the last one of the
-    exploration reached the goal, or both did not.  `seed`: of the encoder noise.
+    The array (E,) has a value for each of the E tried edges, sorted by the number of the start vertex, then by the number of the edge.  It
+    is True if both this try and the last one of the exploration reached the goal, or both did not.  `seed`: of the encoder noise.
     """
     plant, space = offline_plant(seed), roadmap.space
     same = []
@@ -180,7 +180,7 @@ def agreement(roadmap: AdaptiveRoadmap, seed: int) -> Array:
 
 
 def perform(service: Service, folder: Path) -> None:
-    """Explore the roadmap of the job in `folder` on the live robot, until it is finished or the job's number of tries is made.
+    """Explore the roadmap of the job in `folder` on the live robot, until it is finished or the tries have reached the job's limit.
 
     Observations are stored at once, so a stopped exploration can be continued.
     """
@@ -229,8 +229,8 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 def explore_live(folder: Path, seed: int, most: int | None) -> None:
     """Explore the roadmap of a seed on the live robot, or continue an exploration that was stopped.
 
-    `folder`: has the store of the observations, and a folder for the recording of each launch.  `most`: largest number of tries; None: no
-    limit.  Nothing is done if the exploration is finished.
+    `folder`: here the observations are stored, and each launch gets a subfolder for its recording.  `most`: largest number of tries; None:
+    no limit.  Nothing is done if the exploration is finished.
     """
     folder.mkdir(exist_ok=True)
     if (folder / DONE).exists():
@@ -280,11 +280,13 @@ def unreached(values: Mapping[str, Any]) -> int:
 
 
 def findings(found: Cells, live: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Return the results of all cells (explorations, one for each seed) and of the live exploration.
+    """Return the results of the explorations: one offline for each seed, and the live one.
 
-    Keys: "maps", a dict from "seed N" or "live" to a row of the roadmap: minutes of robot time, numbers of edges, repairs and unreached
-    samples (the random poses of the map), depth of the deepest solid contact, and others; "claims", a list with the judged claims, as dicts
-    (`Claim.record`). `live`: the result of `read_live`; None: not explored live.
+    Keys: "maps", a dict from "seed N" or "live" to the measures of this roadmap, as a dict; "claims", a list with the judged claims, as
+    dicts (`Claim.record`).  The measures are "finished"; "minutes" of robot time; the numbers of "edges", of "tried" and of "feasible"
+    edges; the number of random poses that were never reached ("samples_not_come_to"); the number of "repairs"; "agree", the share of the
+    tried edges that had the same result in another try; and the depth of the deepest solid contact ("deepest_mm").  `live`: the result of
+    `read_live`; None: not explored live.
     """
     results = sorted(found.values(), key=lambda result: result.cell.seed)
     rows = {f"seed {result.cell.seed}": _row(result.values) for result in results}
@@ -297,9 +299,10 @@ def findings(found: Cells, live: Mapping[str, Any] | None = None) -> dict[str, A
 
 @dataclass(frozen=True)
 class Explored:
-    """The explored maps, for the rules of the claims.
+    """The explored maps, from which the claims are judged.
 
-    `maps`: results of `explored` for all seeds.  `done`: those that are finished.  `live`: the result of `read_live`, or None.
+    `maps`: results of `explored` for all seeds.  `done`: those in which all reachable edges were tried.  `live`: the result of `read_live`,
+    or None.
     """
 
     maps: list[dict[str, Any]]
@@ -429,9 +432,10 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 def results(folder: Path) -> dict[str, Any]:
-    """Compute the results from the finished cells in `folder` and its live exploration if there is one, as `findings` returns them.
+    """Compute the results of the finished explorations in `folder`, with the live one if there is one, as `findings` returns them.
 
-    Keys: "maps", a dict from the name of a roadmap to a row of numbers; "claims", a list with the judged claims, as dicts (`Claim.record`).
+    Keys: "maps", a dict from the name of a roadmap ("seed N" or "live") to a dict of its measures; "claims", a list with the judged claims,
+    as dicts (`Claim.record`).
     """
     return findings(load_cells(folder), read_live(folder / "live"))
 

@@ -71,7 +71,7 @@ class Coverage:
 
     @property
     def largest_hole(self) -> float:
-        """The largest distance of a reachable task point from its nearest vertex, in spacings."""
+        """The largest distance of a reachable task point from its nearest vertex, as a multiple of the roadmap's spacing."""
         return float(self.far.max())
 
 
@@ -121,9 +121,9 @@ def valid(
 ) -> NDArray[np.bool_]:
     """Return for each pose `q` (V, n) rad whether it is valid, (V,).
 
-    A valid pose meets the tolerances of all `costs`, is within the motors' limits and within the box of the task (the range of its
-    coordinates), has the task coordinates of its row of `y` (V, m), and differs from the pose `start` (None: home) only in `motors` (None:
-    all).  Contacts are computed by python-fcl, not by the compiled core.
+    A valid pose meets the tolerances of all `costs`, and is within the motors' limits.  Its task coordinates are within the box of the task
+    (the range of its coordinates), and are equal (to 1e-9) to its row of `y` (V, m).  Motors that are not in `motors` (None: all may move)
+    are as in the pose `start` (None: home).  Contacts are computed by python-fcl, not by the compiled core.
     """
     reference = mobee.Model(solid_robot(model.robot), model.world, engine="fcl")
     pose = reference.evaluate(q)
@@ -175,8 +175,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def cells(arguments: argparse.Namespace) -> list[Cell]:
-    """Return the cells (pieces of work): for each task one for the reachable part, and one for each roadmap (method and seed).
+    """Return the cells (pieces of work) of the experiment.
 
+    For each task, one cell finds the task points that the robot can reach.  For each task, method and seed, one cell builds a roadmap.
     With --quick: three small tasks.
     """
     tasks = arguments.tasks or (QUICK if arguments.quick else tuple(EXAMPLES))
@@ -236,7 +237,7 @@ def built(example: Example, method: Method, seed: int) -> dict[str, Any]:
     """Build the roadmap of an example with this method ("nes" or "least_squares"), and return its measures and the map itself.
 
     Measures: "vertices" and "evaluations", numbers; "processor_s" and "wall_s"; "valid", share of valid poses; "kept", number of edges of
-    the map over the number of edges that join all vertices to their nearest neighbours; "free", share of edges without contact;
+    the map, divided by the number of edges that join all vertices to their nearest neighbours; "free", share of edges without contact;
     "connected", share of vertices in the largest component.  The map: "q" (V, n) rad, "y" (V, m), "edges" (E, 2) and "spacing" (m,).
     `seed`: of the search.
     """
@@ -281,11 +282,12 @@ def findings(runs: Runs) -> dict[str, Any]:
 
 
 def maps(found: Cells) -> Runs:
-    """Return the measures of the roadmaps by (task, method): dicts from the name of a measure to its values (seeds,).
+    """Return a dict from (task, method) to the measures of these roadmaps: a dict from the name of a measure to its values, (seeds,).
 
-    The names (COLUMNS) are "vertices"; "processor_s"; "evaluations_a_vertex"; "coverage", the share of the reachable task points within a
-    spacing of a vertex; "largest_hole", in spacings; "valid", "kept", "free" and "connected" as in `built`.  "coverage" and "largest_hole"
-    are NaN if the reachable points of the task are not known yet.
+    The names (COLUMNS) are "vertices"; "processor_s"; "evaluations_a_vertex"; "coverage", the share of the reachable task points that have
+    a vertex within one spacing (the distance between neighbouring vertices); "largest_hole", the largest distance of such a point from its
+    nearest vertex, as a multiple of the spacing; "valid", "kept", "free" and "connected" as in `built`.  "coverage" and "largest_hole" are
+    NaN if the reachable points of the task are not known yet.
     """
     reach = {one.cell.settings["task"]: one.values["points"] for one in found.values() if one.cell.settings["method"] == REACH}
     built = sorted((one for one in found.values() if one.cell.settings["method"] != REACH), key=lambda one: one.cell.seed)
@@ -306,9 +308,10 @@ def are_complete(runs: Runs) -> bool:
 
 @claim("thesis 3.4, figs. 3.1-3.11", f"maps for all 13 tasks: at least {COVERED:.0%} of the reachable task space covered", "figures only")
 def maps_of_all(runs: Runs) -> Measured:
-    """Judge whether the roadmaps of all tasks of the thesis' figures cover at least 95 % (COVERED) of the reachable task points.
+    """Judge whether the roadmaps of the tasks cover at least 95 % (COVERED) of the task points that the robot can reach.
 
-    Returns the smallest coverages as text, and the verdict, which depends only on the maps by evolution, the method of the thesis.
+    The task of figure 4.8 is left out.  Returns a text with the smallest coverage of each method, and the verdict.  The verdict depends
+    only on the maps that were built by evolution ("nes"), the method of the thesis.
     """
     covered = {method: {task: float(runs[task, method]["coverage"].min()) for task in _figures()} for method in NAMES}
     return _least(covered), all(share >= COVERED for share in covered[NES].values())
@@ -371,9 +374,10 @@ def _digits(column: str) -> int:
 
 
 def figure(folder: Path) -> Path:
-    """Draw a cloud of marker positions for one map of every task, on one sheet in `folder`; returns its path.
+    """Draw the marker positions of one map of every task as clouds of points, on one sheet in `folder`; returns the path of the sheet.
 
-    A map by evolution is preferred, and the first seed.  Raises InvalidValue without maps.
+    Of each task, the map by evolution with the lowest seed is drawn; without such a map, the one by least squares.  Raises InvalidValue
+    without maps.
     """
     found = load_cells(folder)
     finished = [one for one in found.values() if one.cell.settings["method"] != REACH]

@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures of roadmaps: the positions of their markers, and a motion through each (as thesis figs. 3.1-3.11).
+"""Pictures of roadmaps, as thesis figs. 3.1-3.11: a cloud and a film for each task.
+
+The cloud shows the positions of the task's markers (named points on the robot, such as the palm) in all poses of the roadmap.  The film
+shows a motion through the roadmap.
 
     python -m experiments.claims.ch3_roadmaps.trm_pictures TASK [TASK ...] [--method least_squares] [--out FOLDER]
 
 Writes TASK.npz (a roadmap that `mobee roadmap` can read), TASK_cloud.png and TASK_film.png.  For several tasks it also writes
-films_one_hand.png, films_both_hands.png and clouds.png, each with the pictures of several tasks.  A map that exists already is not built
-again.
+sheets on which their pictures are together: films_one_hand.png, films_both_hands.png and clouds.png.  A map that exists already is not
+built again.
 """
 
 from __future__ import annotations
@@ -36,16 +39,19 @@ COLUMNS = 4
 
 
 def draw_cloud(example: Example, roadmap: Roadmap, path: Path, height: int = 400) -> Path:
-    """Draw the marker positions of all poses of a roadmap, and the robot in one pose, to `path`; returns `path`.
+    """Draw the positions of the example's markers in all poses of a roadmap, and the robot in one pose, to `path`; returns `path`.
 
-    `height`: height of the picture, pixels.
+    A marker is a named point on the robot, such as the right palm.  `height`: height of the picture, pixels.
     """
     shown = roadmap.q[_near(roadmap, example.via[0])]
     return marker_cloud(example.model, roadmap.q, example.markers, path, shown, title=_title(example), height=height)
 
 
 def cloud_panel(example: Example, roadmap: Roadmap, height: int) -> Panel:
-    """Return a picture of the marker positions of a roadmap in one view, with its title below.  `height`: pixels."""
+    """Return a picture of the positions of the example's markers in all poses of a roadmap, in one view, with its title below.
+
+    A marker is a named point on the robot, such as the right palm.  `height`: pixels.
+    """
     shown = example.model.evaluate(roadmap.q[_near(roadmap, example.via[0])])
     pose = example.model.evaluate(roadmap.q)
     places = np.concatenate([pose.position(marker) for marker in example.markers])

@@ -80,8 +80,8 @@ def both_held() -> Example:
 def elbow_down() -> Example:
     """The right hand moves in front of the robot while its elbow stays low (thesis fig. 3.1, right).
 
-    The elbow is never higher than 5 cm above the root frame's origin, 10 cm below the shoulder.  The task space is the position (x, y, z)
-    of the hand, in m, root frame.
+    The elbow stays at most 5 cm above the origin of the root frame; this limit is 10 cm below the shoulder.  The task space is the position
+    (x, y, z) of the hand, in m, root frame.
     """
     highest = 0.05  # m, of the elbow
     task = tasks.place(RIGHT, "xyz", [(-0.48, -0.12), (-0.20, 0.44), (-0.06, 0.38)])
@@ -147,8 +147,9 @@ def bimanual_inspect() -> Example:
 def inspect_hand() -> Example:
     """Rotate the right hand and its object in front of the eyes (thesis fig. 3.5).
 
-    The hand stays at one position, and the gaze is directed at it.  The task space is the angle [rad] of the palm's normal about the
-    vertical axis: 0 when the palm points forward, away from the robot, and pi when the eyes see it from the front.
+    The hand stays at one position, and the gaze is directed at it.  The task space is the direction of the palm's normal in the horizontal
+    plane, as an angle [rad] about the vertical axis: 0 when the palm points forward, away from the robot, and pi when it points back,
+    towards the robot.
     """
     place = (-0.26, 0.05, 0.28)  # m
     model = alone()
@@ -262,7 +263,7 @@ def pregrasp() -> Example:
     """Move the right hand, palm down, 6 cm above the table, to where it could begin a grasp (thesis fig. 4.8).
 
     The task space is the position (x, y) of the hand, in m, root frame.  The map has about 4400 poses.  The thesis has about 5000, one for
-    every square centimetre of half a square metre; this area needs both hands, and the right palm reaches only 0.3 m^2.
+    every square centimetre of half a square metre.  The right palm alone reaches only 0.3 m^2; half a square metre needs both hands.
     """
     terms = [costs.orientation(RIGHT, DOWN), costs.plane(RIGHT, UP, -0.04)]  # 6 cm above the table
     task = tasks.place(RIGHT, "xy", [(-0.74, -0.14), (-0.75, 0.75)])

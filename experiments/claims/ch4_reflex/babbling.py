@@ -138,8 +138,8 @@ def summarise(trials: Sequence[Trial]) -> dict[str, Any]:
 
     Main keys: "collisions", number of solid contacts; "deepest_mm", depth of the deepest one; "pairs", dict from a pair of shapes to its
     number of contacts; "commands", number of commands to a part; "completed", "deflected" and "returned", how many commands had this
-    outcome (as in `babbling_trial.Judged`); "worst_beyond_limit_deg"; "jerk_over_speed" [1/s^2].  Angles are in degrees where the key says
-    so, else in rad.
+    outcome (as in `babbling_trial.Judged`); "worst_beyond_limit_deg", largest distance of a motor beyond a limit, negative inside;
+    "jerk_over_speed", rms jerk divided by rms speed [1/s^2].  Angles are in degrees where the key says so, else in rad.
     """
     touches = [touch for trial in trials for touch in trial.touches]
     commands = [command for trial in trials for command in trial.commands]

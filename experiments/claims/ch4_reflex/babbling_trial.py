@@ -51,7 +51,7 @@ class Targets:
 
 
 class PositionMove:
-    """A minimum-jerk motion of all motors from rest to rest.  `duration`: that of the slowest motor [s]."""
+    """A minimum-jerk motion of all motors from rest to rest.  `duration`: time until the last motor arrives [s]."""
 
     def __init__(self, start: Array, target: Array, speed: Array) -> None:
         """`start`, `target`: positions (n,) rad.  `speed`: (n,) rad/s, the largest speed of each motor."""
@@ -71,7 +71,8 @@ class Commanded(Struct, frozen=True, forbid_unknown_fields=True):
     """A posture that was commanded to all parts at once, and how this command ended.
 
     `begin`: tick of the command.  `end`: tick at which its outcome is judged.  `target`: positions of all motors [rad].  `endings`: how the
-    command ended, by part: "over" (its time has passed), "settled", "timeout" or "refused" (ended by the safety layer).
+    command ended, by part; without MoBeE and with MoBeE 1.0: "over" (the time of the move has passed) or "refused" (ended by the safety
+    layer); with MoBeE 2.0: "settled" or "timeout" (as the controller reports), or "refused" (another end).
     """
 
     begin: int
@@ -209,11 +210,11 @@ def _size(path: Path) -> int:
 class Judged(Struct, frozen=True):
     """The outcome of a posture that was commanded to all parts at once.
 
-    `outcomes`: by part; "completed": the part came within 10 degrees of its target; "returned": it did not, and ended within 5 degrees of
-    its start; "deflected": it ended elsewhere.  `endings`: by part, how the command ended: "over" (its time has passed), "settled",
-    "timeout" or "refused" (ended by the safety layer).  `left`: by part, the largest remaining error of a motor [rad].  `duration`: from
-    the command to the tick at which it is judged [s].  `path`: length of the path of each motor, summed over the 23 motors that babble
-    [rad].  `way`: the same for the straight path to the target [rad].
+    `outcomes`: by part; "completed": all motors of the part ended within 10 degrees of the target; "returned": they did not, and ended
+    within 5 degrees of the start; "deflected": neither.  `endings`: how the command ended, by part, as in `Commanded`.  `left`: by part,
+    the largest remaining error of a motor [rad].  `duration`: from the command to the tick at which it is judged [s].  `path`: length of
+    the path of each motor, summed over the 23 motors that babble [rad].  `way`: this sum for the straight path from the start to the target
+    [rad].
     """
 
     outcomes: dict[str, Outcome]
@@ -225,10 +226,10 @@ class Judged(Struct, frozen=True):
 
 
 class Lockstep(Struct, frozen=True):
-    """The part of the launcher's summary that concerns lockstep.
+    """The part of the launcher's summary about lockstep, in which every tick waits for the answers of all processes.
 
     `ticks`: number of ticks.  `speed`: in multiples of real time.  `repeatable`: whether all processes answered every tick in time.
-    `states_sha256`: hash of the stream of states.
+    `states_sha256`: SHA-256 hash of the states of all parts (q, dq, mode and gate) in all ticks.
     """
 
     ticks: int
@@ -244,12 +245,12 @@ class _Summary(Struct):
 
 
 class Trial(Struct, frozen=True):
-    """The measurements of one trial.  Those of motors are over the 23 motors that babble.
+    """The measurements of one trial; motors are only the 23 that babble (torso, head and arms without hands).
 
     `seconds`: robot time [s].  `commands`: outcomes of all commands.  `touches`: contacts of solids.  `beyond`: largest distance of a motor
     beyond a limit [rad], negative inside; `motor`: its name.  `speed_squared` and `jerk_squared`: means over ticks and motors, in (rad/s)^2
-    and (rad/s^3)^2.  `jerk_max`: [rad/s^3].  `path`: length of the motors' paths, summed [rad].  `lockstep`: the part of the launcher's
-    summary that concerns lockstep.
+    and (rad/s^3)^2.  `jerk_max`: [rad/s^3].  `path`: length of the motors' paths, summed [rad].  `lockstep`: ticks, speed and repeatability
+    of the run.
     """
 
     seconds: float

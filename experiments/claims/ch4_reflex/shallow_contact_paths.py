@@ -85,7 +85,8 @@ class Table:
     def spots(self, number: int, seed: int) -> list[Spot]:
         """Return `number` random places at which the hand just touches the table's field, as `Spot`.
 
-        Through each of these places there are paths at 90, 45 and 0 degrees to the table's top.  `seed`: of the places.
+        The table's field is the zone around the table in which the fields of the hand, larger volumes that are not solid, overlap the
+        table.  The arm can follow the paths through each place at 90, 45 and 0 degrees to the table's top.  `seed`: of the random choice.
         """
         rng = np.random.default_rng([seed, 0x67])
         found: list[Spot] = []
@@ -202,7 +203,7 @@ class Client:
 
     @property
     def leaves_start(self) -> bool:
-        """Whether the next reference is the beginning of the straight approach, where a new position command begins."""
+        """Whether the next reference is the first one of the straight approach; the client begins a new position command there."""
         return self._next == self.begin
 
     @property
@@ -218,6 +219,6 @@ class Client:
         return reference
 
     def retry(self, q: Array) -> None:
-        """Continue at the nearer of two references to `q` (n,) rad: the first of the path, or the first of the straight approach."""
+        """Continue at the first reference of the path or of the straight approach, whichever is nearer to the positions `q` (n,) rad."""
         places = (0, self.begin)
         self._next = min(places, key=lambda place: float(np.abs(self._references[place] - q).max()))

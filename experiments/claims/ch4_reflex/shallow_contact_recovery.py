@@ -64,9 +64,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return the conditions of the sweep: every angle of approach at every spot, a place at which the hand touches the table's field.
+    """Return the conditions of the sweep: one for each pair of an angle of approach and a spot.
 
-    Each seed has other spots.
+    A spot is a place at which the hand just touches the table's field, the zone in which the fields of the hand overlap the table.  Each
+    seed draws other spots.
     """
     angles, spots, repeat = arguments.angles, arguments.spots, arguments.repeat
     if arguments.quick:
@@ -106,11 +107,11 @@ def _spots(count: int, seed: int) -> list[Spot]:
 class Truth:
     """Records the depths of contacts, and the first recovery (motion back along earlier poses), from the true joint positions.
 
-    `depth`, `solid`: depth [m] of the deepest contact, and of the deepest contact of solids.  `progress`: largest distance [m] of the hand
-    from the start of the straight approach, along the table.  `flips`: number of changes between contact and no contact, by the encoders.
-    `flicker`: ticks from the first contact to the last pose without contact, by the encoders.  Of the first recovery, `again`: a contact
-    came back, by the encoders; `came_back`: the same by the true positions; `never`: the hand was still in contact at the end; `deeper`:
-    the hand was more than 1 mm deeper while it moved back than while it stopped.
+    `depth`: depth of the deepest contact, of fields or solids [m].  `solid`: the same for solids only.  `progress`: largest distance [m] of
+    the hand from the start of the straight approach, along the table.  `flips`: number of changes between contact and no contact, by the
+    encoders.  `flicker`: ticks from the first contact to the last pose without contact, by the encoders.  Of the first recovery, `again`: a
+    contact came back, by the encoders; `came_back`: the same by the true positions; `never`: the hand was still in contact at the end;
+    `deeper`: the hand was more than 1 mm deeper while it moved back than while it stopped.
     """
 
     def __init__(self, table: Table, path: HandPath) -> None:
@@ -150,7 +151,7 @@ class Truth:
             self._follow(reflex.recovery, depth)
 
     def finish(self) -> None:
-        """Evaluate the first recovery at the end of the trial, if it has not ended before."""
+        """Evaluate the first recovery at the end of the trial, if the recovery is not complete by then."""
         if not self._is_over and self._first is not None:
             self._conclude(self._first, self._depths[-1])
 
@@ -177,12 +178,12 @@ class Truth:
 class Trial:
     """Measurements of a trial.
 
-    `variant`: "off" (no reflex), "naive" (reflex of MoBeE 1.0), "mended" (the same with filter and dead time) or "2.0" (controller of MoBeE
-    2.0).  `angle`: of approach, degrees.  `spot`: index of the place at which the hand touches.  `seed`: of the encoder noise.  `depth`:
-    depth of the deepest contact, of fields or solids [m], by the true positions; `solid`: the same for solids.  `switches`: changes of
-    control between client and reflex, per second.  `flips`: changes between contact and no contact per second, by the encoders.  `flicker`:
-    time [s] from the first contact to the last pose without contact by the encoders; 0 unless the variant is "off".  `reflexes`: number of
-    reflexes.
+    `variant`: "off" (no reflex), "naive" (reflex of MoBeE 1.0), "mended" (the same, but violations count only after a minimum duration, and
+    the reflex brakes before it moves back and waits afterwards) or "2.0" (controller of MoBeE 2.0).  `angle`: of approach, degrees.
+    `spot`: index of the place at which the hand touches.  `seed`: of the encoder noise.  `depth`: depth of the deepest contact, of fields
+    or solids [m], by the true positions; `solid`: the same for solids.  `switches`: changes of control between client and reflex, per
+    second.  `flips`: changes between contact and no contact per second, by the encoders.  `flicker`: time [s] from the first contact to the
+    last pose without contact by the encoders, only for the variant "off"; 0 for the others.  `reflexes`: number of reflexes.
 
     Of the first recovery, `again`: a contact came back, by the encoders; `came_back`: the same by the true positions; `never`: the hand was
     still in contact at the end of the recovery or of the trial; `deeper`: the hand was more than 1 mm deeper while it moved back than while
@@ -212,8 +213,9 @@ class Trial:
     def recovered(self) -> bool:
         """Whether the first recovery succeeded (MoBeE 1.0 only).
 
-        It succeeds if the hand ends without contact, touched nothing again and was not deeper while it moved back, and no reflex follows
-        within 0.3 s (RELAPSE_TIME).
+        It succeeds if four conditions hold.  The hand has no contact at the end of the recovery or of the trial.  It did not touch again
+        after a contact had ended.  While it moved back, it was at most 1 mm deeper in contact than while it stopped.  The next reflex does
+        not start within 0.3 s (RELAPSE_TIME).  The first three are judged by the true positions.  Without a reflex it is False.
         """
         return self.reflexes > 0 and not (self.came_back or self.never or self.deeper or self.relapse)
 
@@ -367,7 +369,7 @@ def results(trials: Sequence[Trial]) -> dict[str, Any]:
 
 
 def summary(trials: Sequence[Trial]) -> dict[str, float]:
-    """Return the means and extremes over the trials of one variant at one angle; without trials only their number, 0.
+    """Return the means and extremes over the trials of one variant at one angle; {"trials": 0} if there are none.
 
     Keys: "trials", number of trials; the names in SHARES, such as "recovered" and "switches", with the means of these attributes of
     `Trial`; "depth_mm_median", "depth_mm_max" and "solid_mm_max", depths of contacts; "progress_cm", mean of `progress` in cm.

@@ -9,12 +9,12 @@ reproduction: with today's controllers no contact of solids between the robots d
 Each robot gets random postures over its whole range at 20 % speed (23 motors of the iCub, 6 of the Katana), the same in all conditions.
 The protections are: none; a reflex for each robot, with its own history of poses, both equally fast ("in step") or the Katana's a quarter
 as fast ("out of step"); one reflex with one history for both robots; a controller of MoBeE 2.0 for each robot.  A reflex is triggered by a
-contact of its robot's fields or solids, a motor beyond a limit, or a violated clause (constraint on several joints).  Motors have lag,
-delay, play and encoder noise; a tick is 10 ms; everything runs in one process.  The model computes the contacts of the true postures;
-solids do not stop each other.  The iCub's controller has the default gains, the Katana's the gains for derived fields.  Widths of fields
-and gains were chosen with the results of seeds 0 to 4 in view; the recorded run has seeds from 100.  A collision is a contact deeper than 2
-mm between solids of the two robots.  Run time: for an hour of robot time on one core, three minutes with controllers, and 20 minutes with
-any other protection.
+contact of its robot's solids or fields (larger volumes around the links), a motor beyond a limit, or a violated clause (constraint on
+several joints).  Motors have lag, delay, play and encoder noise; a tick is 10 ms; everything runs in one process.  The model computes the
+contacts of the true postures; solids do not stop each other.  The iCub's controller has the gains `Gains.default()`.  The Katana's has
+`Gains.derived()`, which are for fields that `mobee.derive` computed.  The widths of the fields and the gains were chosen with the results
+of seeds 0 to 4 in view; the recorded run has seeds from 100.  A collision is a contact deeper than 2 mm between solids of the two robots.
+Run time: for an hour of robot time on one core, three minutes with controllers, and 20 minutes with any other protection.
 """
 
 from __future__ import annotations
@@ -59,7 +59,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
     """Return a condition of the sweep for each protection of the two robots: none, reflexes of MoBeE 1.0, or controllers of MoBeE 2.0.
 
-    The names are the keys of PROTECTIONS.  The runs without controllers last a third of the minutes.
+    The names are the keys of PROTECTIONS.  Runs with controllers last --minutes of robot time (with --quick: 0.2 minutes); runs with
+    another protection last a third of that time.
     """
     minutes = QUICK_MINUTES if arguments.quick else arguments.minutes
     return [

@@ -79,7 +79,10 @@ class Client:
 
 
 class Unprotected:
-    """A client without any protection; the commands are its reference positions."""
+    """A client without any protection; the commands are its reference positions.
+
+    `own`: slice of the robot's motors among those of both robots.  `seed`: of the random postures.
+    """
 
     mode: Mode = "position"
 
@@ -96,7 +99,8 @@ class Unprotected:
 class WithReflex:
     """A client and the reflex of MoBeE 1.0, which moves the robot back along its recent poses after a violation.
 
-    `client`: sends the references.  `watch`: function that returns the violations in a pose; they trigger the reflex.
+    `own`: slice of the robot's motors among those of both robots.  `client`: sends the references.  `watch`: function that returns the
+    violations in a pose; they trigger the reflex.
     """
 
     mode: Mode = "position"
@@ -131,7 +135,11 @@ class WithReflex:
 
 
 class WithController:
-    """A client and a controller of MoBeE 2.0, which moves only the robot's own motors; the random postures are its attractors."""
+    """A client and a controller of MoBeE 2.0, which moves only the robot's own motors; the random postures are its attractors.
+
+    `own`: slice of these motors among those of both robots.  `seed`: of the random postures.  `model`: of both robots.  `gains`: of the
+    controller.
+    """
 
     mode: Mode = "velocity"
 
@@ -208,7 +216,7 @@ def is_between(first: str, second: str) -> bool:
 
 
 def watch_of(robots: Sequence[str]) -> Callable[[Pose], list[Violation]]:
-    """Return a function that returns the violations in a pose that concern the given robots.
+    """Return a function that finds the violations of the given robots in a pose, and returns them as a list.
 
     `robots`: "icub", "katana" or both.  Violations are contacts with one of their shapes, motors beyond a limit, and clauses (constraints
     on several joints) that do not hold.  The contact of the Katana's base with the table does not count.
@@ -232,9 +240,9 @@ def _is_of(robot: str, violation: Violation) -> bool:
 def babble(makers: Sequence[tuple[slice, Protected]], model: Model, minutes: float, seed: int) -> Truth:
     """Simulate both robots for `minutes` of robot time, and return the record of their contacts.
 
-    `makers`: pairs of a slice, among the motors of both robots, and the protected client that commands the motors of this slice.  `seed`:
-    of the motors' encoder noise.  A command that is computed from the encoders of tick k moves the motors from tick k + 1 on, as in the
-    live system.
+    `makers`: a pair for each protected client: the slice of the motors that it commands, among those of both robots, and the client.
+    `seed`: of the motors' encoder noise.  A command that is computed from the encoders of tick k moves the motors from tick k + 1 on, as in
+    the live system.
     """
     robot, parameters, truth = two_robots(), MotorParameters(), Truth()
     motors = Motors(robot, parameters, seed, robot.home)

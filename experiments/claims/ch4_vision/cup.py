@@ -9,9 +9,9 @@ A seed draws the place of the cup (5.6 cm wide, 13 cm high, 150 g) and 0 to 3 pi
 Placements without room for the open hand beside the cup are drawn again.  Cup and clutter move when they are pushed.  The places that the
 cameras report have random errors, with a standard deviation of 2 mm along x and y.  Everything runs in one process: the model, the
 controller with the default gains, and MuJoCo in ticks of 10 ms.  The motors have lag, delay, play and encoder noise; the largest torques of
-the finger motors are 0.09 and 0.3 N m.  As in a reach, contacts of the fields with the cup and with the seen clutter exert no force on the
-hand.  A jump of the torques of shoulder and waist is a bump: the arm moves back, and the next plan leads around or over the position of the
-palm at the bump.
+the finger motors are 0.09 and 0.3 N m.  As in a reach, contacts of the fields (larger volumes around the links, which cause repulsive
+forces) with the cup and with the seen clutter exert no force on the hand.  A jump of the torques of shoulder and waist is a bump: the arm
+moves back, and on the next path the palm moves around or over the place of the bump.
 
 Planners of the path to the pre-grasp: the map of pre-grasps (A* over free edges); the learned reacher, which has learned from 300 tries (a
 plan and then a reach to a target) on the offline plant without clutter, and moves only the arm; inverse kinematics with RRT-Connect of
@@ -85,8 +85,8 @@ def _reasons(runs: Runs) -> dict[str, int]:
 def findings(found: Cells) -> dict[str, Any]:
     """Return the results of the sweep.
 
-    Keys: "planners", a dict from the planner to a dict of its measures; "ended", a dict from the planner to a dict from a reason, for which
-    trials failed, to the number of these trials; "claims", a list with the judged claims, as dicts (`Claim.record`).  Among the measures,
+    Keys: "planners", a dict from the planner to a dict of its measures; "ended", for each planner a dict from each reason of failure to the
+    number of trials that failed for this reason; "claims", a list with the judged claims, as dicts (`Claim.record`).  Among the measures,
     "planning, ms" is the processor time of all plans of a trial, median; "distance, mm" and "angle, deg" are None if no trial came to the
     pre-grasp.
     """

@@ -89,8 +89,8 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
     Main keys: "before" and "after", errors of the ball's position without and with the calibration (N,) m; "normalised", squared errors
     after calibration, normalised by the covariance that the robot computes (N,); "hand_before" and "hand_after", median errors of the hand
-    [m]; "normalised_parameters", squared error of the calibrated parameters, normalised by their covariance.  `settings`: "postures" of the
-    calibration and "places" of the ball, their numbers.  `seed`: of everything random.
+    [m]; "normalised_parameters", squared error of the calibrated parameters, normalised by their covariance.  `settings`: "postures",
+    number of postures of the hand for the calibration; "places", number of places of the ball.  `seed`: of everything random.
     """
     chosen, model = CameraSettings(samples=2), Model(rig().robot, load_world("table"))
     errors = camera_errors(chosen, rig().robot, list(rig().cameras), seed)

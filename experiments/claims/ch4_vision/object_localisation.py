@@ -2,10 +2,10 @@
 """Ball, cup and box seen by imperfect, calibrated cameras: errors of their positions, their covariances, and false objects.
 
 Claim: a robot that has calibrated its cameras by looking at its own hand places ball, cup and box within millimetres, knows how well, and
-sees nothing where nothing is.  Source: thesis 4.3.3 puts into the world what the eyes see, without numbers.  Aims of this reproduction:
-over random gazes and places the error is at most 5 mm (median) and 15 mm (95 %); the squared error, normalised by the reported covariance,
-is below the 95 % quantile of its distribution for 90 to 98 % of the places; and no false object is reported in 10 minutes, at 15 pictures a
-second, before a table without the things, where papers have the colours of the things.
+reports no object where there is none.  Source: thesis 4.3.3 puts into the world what the eyes see, without numbers.  Aims of this
+reproduction: over random gazes and places the error is at most 5 mm (median) and 15 mm (95 %); the squared error, normalised by the
+reported covariance, is below the 95 % quantile of its distribution for 90 to 98 % of the places; and no false object is reported in 10
+minutes, at 15 pictures a second, in front of a table without the things, on which some sheets of paper have the colours of the things.
 
 A trial draws the errors of one robot and calibrates it by 40 postures of its hand.  Then it shows ball, cup and box side by side in random
 places, each thing upright and with a random angle, and takes one picture with each camera; things that are hidden by another thing or an
@@ -125,7 +125,7 @@ class Robot:
         return scene, Cameras(scene, self._settings, errors, seed)
 
     def gaze(self) -> tuple[Array, Array]:
-        """Return a random posture (n,) rad, and a position (3,) m, root frame, that is in both pictures in this posture."""
+        """Return a random posture (n,) rad, and a position (3,) m, root frame, that both cameras see in this posture."""
         return random_gaze(self._rng)
 
     def put(self, name: str, position: Array, yaw: float) -> None:
@@ -152,7 +152,7 @@ class Robot:
     def look(self, q: Array) -> tuple[Eyes, list[Placed]]:
         """Take pictures in a posture `q` (n,) rad.
 
-        Returns the cameras as the calibrated robot assumes them, and the things that it sees.
+        Returns the poses of the cameras that the robot computes from its encoders and its calibration, and the things that it sees.
         """
         noise = ENCODER / np.sqrt(READINGS)
         moment = Moment(q + noise * self._rng.standard_normal(len(q)), np.zeros(len(q)), np.full(len(q), noise**2))
@@ -169,13 +169,14 @@ class Robot:
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Calibrate one robot, show it ball, cup and box, and then an empty table.
 
-    For each thing that was seen N times: "NAME_error" (N,) m, distance from its true position; "NAME_normalised" (N,), squared error,
-    normalised by the covariance that the robot computes; "NAME_size" (N, g), relative errors of its g sizes, as radius or edges.
-    "box_angle" (N,) rad: error of the box's angle.  Counts: "shown", gazes at things; "taken_for_another", reported positions more than 5
-    cm from the true one; "looks", pairs of pictures of the empty table; "false_objects", objects that the tracker reported there, and
-    "false_places", objects in single pairs of pictures.  "false_regions": regions per picture detected there.  "detector_ms": processor
-    time per picture [ms].  `settings`: "world", its name; numbers of "postures" of the calibration, of "gazes" at things, and of "looks" at
-    the empty table; "detector", its name (optional).  `seed`: of everything random.
+    For each thing NAME whose position was computed N times, at most 5 cm from the true one: "NAME_error" (N,) m, distance from its true
+    position; "NAME_normalised" (N,), squared error, normalised by the covariance that the robot computes; "NAME_size" (N, g), relative
+    errors of its g sizes (radius, height or edges).  "box_angle" (N,) rad: error of the box's angle.  Counts: "shown", gazes at things;
+    "taken_for_another", reported positions more than 5 cm from the true one; "looks", pairs of pictures of the empty table;
+    "false_objects", objects that the tracker reported there, and "false_places", positions that were computed from single pairs of these
+    pictures, without the tracker.  "false_regions": regions per picture detected there.  "detector_ms": processor time per picture [ms].
+    `settings`: "world", its name; numbers of "postures" of the calibration, of "gazes" at things, and of "looks" at the empty table;
+    "detector", its name (optional).  `seed`: of everything random.
     """
     robot = Robot(settings["world"], settings["postures"], seed, settings.get("detector", COLOR))
     return {**_with_things(robot, settings["gazes"]), **_without(robot, settings["looks"])}
@@ -277,7 +278,8 @@ def findings(found: Cells) -> dict[str, Any]:
     """Return the results of the sweep.
 
     Keys: "runs", a dict from each finished cell (one simulated robot) to its numbers, such as "found, share" and the errors in mm of each
-    kind of object; "claims", a list with the judged claims, as dicts (`Claim.record`), which are judged only for the detector by colour.
+    kind of object; "claims", a list with the judged claims, as dicts (`Claim.record`).  The claims are judged only by runs with the
+    detector "color".
     """
     groups = grouped({name: cell for name, cell in found.items() if "detector" not in cell.cell.settings}, "world", ("things",))
     return {"runs": {name: _row(cell.values) for name, cell in found.items()}, "claims": judged(CLAIMS, groups, bool(groups))}

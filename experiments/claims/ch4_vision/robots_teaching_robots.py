@@ -11,8 +11,8 @@ children's block) to random places 20 to 65 cm from the eyes; for each, the iCub
 move on the offline plant under one model, kept apart by the controller; pictures are rendered with distortion and noise, in a room without
 clutter on the table.  The Katana reports the place by its own encoders.  A fifth of the Katana's poses is held out: no localiser (method
 that computes the ball's position from both pictures and the encoders) learns from a picture of them.  The localisers are compared with
-stereo by the model's own cameras, and with stereo by cameras that were calibrated by 20 postures of the hand.  Errors are distances from
-the ball's true place; the error of a robot is its median.  Run time: about three minutes a robot on one core.
+uncalibrated stereo, which uses the cameras of the model, and with stereo after a calibration of the cameras by 20 postures of the hand.
+Errors are distances from the ball's true place; the error of a robot is its median.  Run time: about three minutes a robot on one core.
 """
 
 from __future__ import annotations
@@ -79,8 +79,8 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     Main keys: "errors, NAME", distances (N,) m of the computed from the true positions, for stereo and each localiser; "curves", dict from
     a localiser to its median errors [m], one for each number of lessons (labelled samples) in "counts"; "held_out", number of lessons for
     the test; "reported", median error [m] of the positions that the Katana reports; "robot_seconds", robot time of the teaching [s].
-    `settings`: "poses" of the Katana, "looks" at each, and "postures" of the calibration for stereo, their numbers.  `seed`: of everything
-    random.
+    `settings`: "poses", number of postures of the Katana; "looks", number of looks of the iCub at each; "postures", number of postures of
+    the hand for the calibration of stereo.  `seed`: of everything random.
     """
     lessons, time = taught(settings["poses"], settings["looks"], seed)
     learned, held_out = split_by_pose(lessons.poses, HELD_OUT, seed)
@@ -105,7 +105,10 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def taught(poses: int, looks: int, seed: int) -> tuple[Lessons, float]:
-    """Let the Katana teach the iCub of a seed: `poses` postures of the Katana, with `looks` looks of the iCub at each.
+    """Let the Katana teach an iCub.
+
+    `poses`: number of postures of the Katana.  `looks`: number of looks of the iCub at each.  `seed`: of everything random, also of the
+    errors of the iCub's cameras and encoders.
 
     Returns the lessons (pixels, encoders and reported positions), and the robot time [s] that they took.
     """
@@ -244,7 +247,10 @@ def findings(found: Cells) -> dict[str, Any]:
 
 
 def plot(found: Cells) -> Any:
-    """Return a figure of the errors of stereo and of all localisers, and of their medians over the number of lessons."""
+    """Return a figure of the errors of stereo and of all localisers, and of their medians over the number of lessons.
+
+    A localiser is a method that computes the position of the ball from both pictures and the encoders.
+    """
     groups = grouped(found, "teacher", ("katana",))
     runs = groups["katana"]
     drawing = new_figure(9.5, 4.2)

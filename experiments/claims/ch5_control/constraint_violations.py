@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Constraint violations: a search for the command that violates the cable rows or the forearm clauses most.
+"""Constraint violations: a search for the arm command that violates most the constraints of shoulder cables and forearm.
 
 Claim: with the default gains no attractors, inside or far outside the motors' ranges, held or in any sequence, carry an arm more than 2
 degrees beyond a constraint on several joints (at least one of its inequalities a.q + b > 0 must hold), measured along the normal, -(a.q +
@@ -7,11 +7,11 @@ b)/|a|.  The fastest impact of a motor at a hard stop is reported too.  Source: 
 5.2.5.  Published: no number; the thesis says of positional constraints that their forces may grow without bound, "but this never happens in
 practice".  Run time: 10 000 tries for both gain sets and 2000 with forces of a client, a few minutes.
 
-A try is one command of one arm: a start, three attractors, and how long each attractor is in force.  A forced try has in addition, for each
+A try is one command of one arm: a start, three attractors, and the duration of each attractor.  A forced try has in addition, for each
 attractor, a force in configuration space and one at the palm.  Both arms try at once while the torso moves to a random posture, with a
-table in front of the robot; the motors are those with which the published findings are reproduced.  The first 30 % of the tries are random;
-each of the others varies and combines commands from the worst so far for a clause (constraint).  The forced tries are not part of the
-claim: there a client pushes with the largest force.
+table in front of the robot; the motors have the parameters `MotorParameters()`.  The first 30 % of the tries are random; each of the others
+varies and combines commands from the worst so far for a clause (constraint).  The forced tries are not part of the claim: there a client
+pushes with the largest force.
 """
 
 from __future__ import annotations
@@ -71,10 +71,10 @@ class Search:
     violations so far.  A generation is a group of up to 100 tries that are drawn in the same manner.  `gains`: name of the gain set.
     `forced`: whether a client pushes.  `seed`: of the tries.  `tries`: number so far.  `worst`: largest violation.  `by_clause`: largest
     violation of each clause of an arm.  `stop`: fastest impact of a joint at a hard stop [deg/s].  `course`: pairs of the number of tries
-    and the largest violation so far.  `inside`: for each generation, the largest violation of its tries with all attractors within the
-    motors' ranges.  `random`: for each generation of random tries, its largest violation.  `elite`: for each clause, pairs of a violation
-    and the command that caused it, for the worst commands.  `worst_try`: commands, torso posture, seed, arm and clause of the worst try, to
-    repeat it.
+    and the largest violation so far.  `inside`: for each generation, the largest violation of those of its tries whose attractors are all
+    within the motors' ranges.  `random`: for each generation of random tries, its largest violation.  Both lists have -360 as a first
+    element and for a generation without such tries.  `elite`: for each clause, a list of the worst commands (at most 8), as pairs of the
+    violation and the command as numbers.  `worst_try`: commands, torso posture, seed, arm and clause of the worst try, to repeat it.
     """
 
     gains: str
@@ -102,8 +102,9 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 def search(gains: str, forced: bool, tries: int, seed: int) -> Search:
     """Search for large violations: first by random tries, then by variations of the worst commands of each clause.
 
-    `gains`: name of the gain set.  `forced`: whether a client pushes.  `tries`: number of tries to make; both arms try at once, so if it is
-    odd, only the left arm's try of the last run counts.  Returns the final state.  `seed`: of the random commands.
+    `gains`: name of the gain set.  `forced`: whether a client pushes.  `tries`: number of tries to make.  A run of the plant makes two
+    tries, one with each arm; if the number is odd, the last run counts only for the left arm.  Returns the final state.  `seed`: of the
+    random commands.
     """
     state, numbers = Search(gains, forced, seed), Gains.named(gains)
     while state.tries < tries:
@@ -188,7 +189,7 @@ def _searches(found: Cells) -> list[Search]:
 
 
 def plot(found: Cells) -> Any:
-    """Return a figure with three panels: the largest violation over the tries and by clause, and the worst tries over time."""
+    """Return a figure with three panels: the largest violation over the tries and by clause, and the violation during the worst tries."""
     states = _searches(found)
     drawing = new_figure(14.0, 4.6)
     course, clauses, over_time = drawing.subplots(1, 3, width_ratios=(1.0, 1.35, 1.0))

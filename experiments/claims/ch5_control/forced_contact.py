@@ -7,9 +7,9 @@ oscillate by more than 1 mm at rest.  Source: thesis 5.2.2-5.2.4 (f_config and f
 forces") and 5.1 (J^T control of an unreachable target "will cause the robot to oscillate").  Published: no numbers.  Run time: about six
 minutes.
 
-The experiment has two parts, for both gain sets.  Walls: a force that rises in levels of three seconds presses the robot into table, body
-or limits.  Targets: `mobee.Reacher` pulls the hand to targets with all motors of the body.  Depths are measured at the true joint
-positions.
+The experiment has two parts, for the gain sets "default" and "published_2014".  Walls: a force that rises in levels of three seconds
+presses the robot into table, body or limits.  Targets: `mobee.Reacher` pulls the hand to targets with all motors of the body.  Depths are
+measured at the true joint positions.
 """
 
 from __future__ import annotations
@@ -94,7 +94,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
     """Return the conditions of the sweep: every wall and every target with each gain set.
 
-    A wall is a kind of push into table, body or limits.  With --quick: the first three walls and targets, with three levels of force.
+    A wall is a key of PUSHES: the name of a push of the robot into the table, its own body or joint limits.  A target is a key of GOALS.
+    With --quick: the first three walls and targets, with three levels of force.
     """
     levels, cases = (QUICK_LEVELS, QUICK_CASES) if arguments.quick else (LEVELS, None)
     found = []
@@ -108,7 +109,7 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Press into the wall, or pull the hand to the target, that the settings name.
+    """Run the trial that the settings name: press the robot into a wall, or pull its hand to targets.
 
     For a wall: {"pressed": the result of `press`}.  For a target: "drawn", "times" (T,) s and "distances" (T,) m, the results of
     `draw_hand`.  `settings`: "gains" and either "wall" and "levels" or "target", the arguments of these functions.  `seed`: of the plant.
@@ -125,10 +126,11 @@ def press(gains: str, wall: str, levels: Sequence[float], seed: int) -> list[Rec
     `gains`: name of the gain set.  `wall`: a key of PUSHES, the markers or motors that are pushed and the direction.  `seed`: of the plant.
     `levels`: forces before they are bounded by the control law (squash, eq. 5.8), in N/kg at a marker or rad/s^2 at a motor.
 
-    Each record has the worst values during the level: "solid_mm" and "beside_mm", depth of contacts of solids, for the pairs of shapes that
-    the simulator tests too, and for all other pairs; "pair", the deepest of the tested pairs; "field_mm", depth of contacts of fields,
-    volumes that are not solid; "clause_deg" and "limit_deg", distances beyond constraints and limits, negative inside; "restless_mm",
-    oscillation of the palms.
+    Each record has the worst values during the level: "solid_mm", depth of contacts of solids with an object of the world, or of two links
+    of the robot that are in the simulator's list of pairs; "pair", the deepest of these pairs, "" without contact; "beside_mm", depth of
+    contacts of all other pairs of solids; "field_mm", depth of contacts of fields, volumes that are not solid; "clause_deg" and
+    "limit_deg", distances beyond constraints and limits, negative inside; "restless_mm", oscillation of the palms in the last 2 s of the
+    level.
     """
     plant = OfflinePlant(icub_at_table(), seed, Gains.named(gains), dt=PERIOD[gains])
     robot, step = plant.robot, max(1, round(SAMPLING / plant.dt))
@@ -164,9 +166,9 @@ def draw_hand(gains: str, name: str, seed: int) -> tuple[Record, Array, Array]:
     `gains`: name of the gain set, "default" or "published_2014".  `name`: a key of GOALS, which gives the start posture and the targets.
     `seed`: of the plant.
 
-    Returns the measurements, times (T,) s, and the distances (T,) m of the hand from the target that is in force at these times.  The
-    measurements are "oscillation_mm" and "from_target_mm", oscillation and distance from the last target at the end; "dead_s", the longest
-    time for which the hand stood still before it was at its end position; and the names "gains" and "target".
+    Returns the measurements, times (T,) s, and the distances (T,) m of the hand from the current target at these times.  The measurements
+    are "oscillation_mm" and "from_target_mm", oscillation and distance from the last target at the end; "dead_s", the longest time for
+    which the hand stood still before it was at its end position; and the names "gains" and "target".
     """
     goal, robot = GOALS[name], icub().robot
     plant = OfflinePlant(icub(), seed, Gains.named(gains), dt=PERIOD[gains])
@@ -197,10 +199,10 @@ def draw_hand(gains: str, name: str, seed: int) -> tuple[Record, Array, Array]:
 
 
 def dead_time(hand: Array, dt: float) -> float:
-    """Return the longest time [s] during which the hand had stopped before it was at its end position.
+    """Return the longest time [s] for which the hand stopped before it arrived at its end position; 0 if it did not stop.
 
-    `hand`: positions (T, 3) m.  `dt`: time between two of them [s].  Stopped: slower than 0.2 mm/s over 0.5 s, and more than 1 cm from the
-    end position; shorter stops count as none.
+    `hand`: positions (T, 3) m.  `dt`: time between two of them [s].  The hand has stopped if it moves at less than 0.2 mm/s over 0.5 s and
+    is more than 1 cm from its end position.  Shorter stops are ignored.
     """
     window = max(1, round(WINDOW / dt))  # single ticks are meaningless because of the motors' play
     speed = np.linalg.norm(hand[window:] - hand[:-window], axis=1) / (window * dt)
@@ -211,11 +213,12 @@ def dead_time(hand: Array, dt: float) -> float:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the largest measurements as a dict from the gain set to a dict from the wall, or "drawn: " and the target, to numbers by name.
+    """Return the largest measurements for each gain set, and "passed".
 
-    The names are keys of the dicts of `press` and `draw_hand`.  "passed": whether with the default gains solids are at most 2 mm deep,
-    constraints violated by at most 2 degrees, limits not exceeded, oscillations at most 1 mm, and times without motion at most 0.3 s; None
-    if the default gains were not run.
+    The value of a gain set is a dict; its keys are the walls, and for each target "drawn: TARGET".  Its values are dicts with the largest
+    measurements, with keys as in the results of `press` and `draw_hand`.  "passed": whether with the default gains solids are at most 2 mm
+    deep, constraints violated by at most 2 degrees, limits not exceeded, oscillations at most 1 mm, and times without motion at most 0.3 s;
+    None if the default gains were not run.
     """
     pressed, drawn = _grouped(found)
     table: dict[str, Any] = {gains: {} for gains in GAINS}

@@ -65,10 +65,11 @@ class Judged(Row):
 
     `settling_s`: median settling time of steps [s].  `overshoot`: largest overshoot of a step of a single motor, as a share of the step.
     `solid_mm`: depth of the deepest solid contact while the robot moves between random postures, and while the hands press into the table
-    with commands 1 and 3 ticks old; `field_mm`: depth of the deepest field contact while they press; `pushed_mm`: depth of the deepest
-    solid contact while a client pushes.  `chatter_mm`, `late_mm`, `later_mm`: oscillation of the palms at the table with commands 1, 3 and
-    4 ticks old, mean over the postures.  `clause_deg`, `forced_deg`: largest violation of a constraint without and with a pushing client,
-    negative inside.  `stop_deg_s`: fastest impact at a hard stop.  `longest_ms`: longest control period at which the control law is stable.
+    with commands that act 1 or 3 ticks after they were computed; `field_mm`: depth of the deepest field contact while they press;
+    `pushed_mm`: depth of the deepest solid contact while a client pushes.  `chatter_mm`: oscillation of the palms at the table with
+    commands 1 tick old, mean over the postures; `late_mm`: the same with commands 3 ticks old; `later_mm`: the same with commands 4 ticks
+    old.  `clause_deg`, `forced_deg`: largest violation of a constraint without and with a pushing client, negative inside.  `stop_deg_s`:
+    fastest impact at a hard stop.  `longest_ms`: longest control period at which the control law is stable.
     """
 
     settling_s: float  # median of steps of motors and postures
@@ -143,7 +144,10 @@ class Pressed:
 
 
 def press_targets(count: int) -> list[Array]:
-    """Draw `count` postures (n,) rad with a palm 5 to 25 cm below the table's top, and without contacts if there is no table."""
+    """Draw `count` postures (n,) rad in which a palm is 5 to 25 cm below the table's top.
+
+    In a world without the table these postures have no contacts.
+    """
     robot = icub_at_table().robot
     rng, free = np.random.default_rng(PRESS_SEED), icub()
     found: list[Array] = []
@@ -281,17 +285,17 @@ class Tried:
         return objective(self.judged)
 
     def record(self) -> dict[str, object]:
-        """Return the values and criteria as a row of the file."""
+        """Return the values and criteria as a row of `tune.csv`, the run's file of gain sets."""
         return {**{name: round(value, 6) for name, value in self.numbers.items()}, **self.judged.record()}
 
     @classmethod
     def of_record(cls, row: Mapping[str, str]) -> Tried:
-        """Return the gain set that a row of the file describes."""
+        """Return the gain set that a row of `tune.csv`, the run's file of gain sets, describes."""
         return cls({name: float(row[name]) for name in TUNED}, Judged.of_record(row))
 
 
 def search(tried: list[Tried], sets: int, seed: int) -> Iterator[Tried]:
-    """Judge gain sets until there are `sets`, append each to `tried`, and yield it.
+    """Judge new gain sets until `tried` has `sets` of them; append each new one to `tried`, and yield it.
 
     The sets in `tried` and the seed determine the next set.  The first one is `Gains.default()`.
     """
@@ -302,7 +306,7 @@ def search(tried: list[Tried], sets: int, seed: int) -> Iterator[Tried]:
 
 
 def numbers_of(gains: Gains) -> dict[str, float]:
-    """Return the values of a gain set that the search changes, by the names in TUNED."""
+    """Return those values of `gains` that the search changes, as a dict with the names in TUNED as keys."""
     motors = icub().robot.motors
     springs = gains.of_motors("max_spring", motors)
     numbers = {name: float(getattr(gains, name)) for name in TUNED if name not in SPRINGS}
@@ -340,8 +344,8 @@ def results(tried: list[Tried]) -> dict[str, Any]:
     """Return the default and the best gain set side by side.
 
     "objective": a list of two values, of the default and of the best gain set.  "criteria" and "gains": dicts from a name to a list of two
-    values, of the default and of the best.  "judged": number of gain sets.  "passed": whether no set is clearly better, that is, has less
-    than 0.8 of the default's objective.
+    values, of the default and of the best.  "judged": number of gain sets.  "passed": whether the objective of the best set is at least 0.8
+    times that of the default, so that no set is clearly better.
     """
     before, best = tried[0], min(tried, key=lambda one: one.objective)
     criteria = {name: [round(value, 4), round(asdict(best.judged)[name], 4)] for name, value in asdict(before.judged).items()}

@@ -3,8 +3,8 @@
 
 Claim: the motor model of `mobee.simulation`, with parameters that are fitted to the encoder readings of the PyBullet robot, describes that
 robot, gravity and inertia included: the residuals of the responses are only encoder noise.  Source: thesis 2.2 (the robot does not follow
-its commands exactly).  No parameters are published; the fit is compared with the published setting, the parameters with which the published
-findings are reproduced.
+its commands exactly).  The thesis has no parameters.  The fit is compared with `MotorParameters()`, called the published setting: with it
+this project reproduces the published findings.
 Run time: five minutes on a quiet machine, nearly all of it PyBullet's.
 
 The robot is a black box: velocities are its inputs, noisy encoder positions its outputs.  First the method is checked on simulated motors
@@ -87,10 +87,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
     """Identify the motors of the PyBullet robot from their responses, and compare its motions with those of the offline plant.
 
-    The check and the responses that `folder` already has are not made again.  First the fit is checked on simulated motors with known
-    parameters.  Then the responses are recorded in `folder`, the motor model is fitted to them, and tables of the fitted values are
-    written.  Returns "passed" and "method", the result of the check; "parameters", "encoder_noise" and "residual", statistics of the fit as
-    in `summary`; and "reproduced", the differences of motions as in `reproduce`.
+    First the fit is checked on simulated motors with known parameters.  Then the responses are recorded in `folder`, the motor model is
+    fitted to them, and tables of the fitted values are written.  A result of the check and responses that are already in `folder` are used
+    and not made again.
+
+    Returns "passed" and "method", the result of the check; "parameters", "encoder_noise" and "residual", statistics of the fit as in
+    `summary`; and "reproduced", the differences of motions as in `reproduce`.
     """
     robot = load_robot("icub")
     method = _check(arguments, robot, folder / METHOD)
@@ -153,9 +155,10 @@ class BodyPlant:
 def reproduce(robot: Robot, fit: Fit, actions: int, seed: int) -> dict[str, Any]:
     """Run the same actions of an arm with PyBullet and with the offline plant, and compare the motions with PyBullet's.
 
-    Returns a dict from "identified", "published" and "ideal", the motors of the offline plant, and from "pybullet_with_other_noise", to a
-    dict with the differences from PyBullet's encoder values [deg]: "rms_deg" and "largest_deg", and, at the ends of actions, the mean
-    "end_deg" and "largest_end_deg".  `fit`: the fitted motors.  `actions`: their number.  `seed`: of actions and noise.
+    Returns a dict with four keys.  Three are the motors of the offline plant: "identified" (fitted), "published" (`MotorParameters()`) and
+    "ideal" (without lag, delay, play and friction).  The fourth, "pybullet_with_other_noise", is a second run of PyBullet.  Each value is a
+    dict of differences from the encoder values of the first run of PyBullet [deg]: "rms_deg" and "largest_deg", and, at the ends of
+    actions, the mean "end_deg" and "largest_end_deg".  `fit`: the fitted motors.  `actions`: their number.  `seed`: of actions and noise.
     """
     model = Model(robot, World())
     targets = free_targets(model, actions, np.random.default_rng([seed, 3]))
@@ -255,9 +258,11 @@ def toml_data(robot: Robot, fit: Fit, seed: int) -> str:
 def summary(robot: Robot, fit: Fit) -> dict[str, Any]:
     """Return statistics of the fit over all motors.
 
-    "parameters": dict from each parameter to its unit, median, range and median standard deviation, the published setting, and the largest
-    distance of a motor's value from this setting in standard deviations.  "encoder_noise": found and published noise [deg].  "residual":
-    median chi-square per degree of freedom, largest misfit [deg] and the motor that has it, for the fitted and for the held-out responses.
+    "parameters": for each parameter a dict with its "unit"; "median", "lowest" and "highest" of the motors' values; "deviation", the median
+    of their standard deviations; "published", the value of `MotorParameters()`; and "farthest_from_published_in_deviations", the largest
+    distance of a motor's value from the published one, divided by the standard deviation of the motor's value.  "encoder_noise": found and
+    published noise [deg].  "residual": median chi-square per degree of freedom, largest misfit [deg] and the motor that has it, for the
+    fitted and for the held-out responses.
     """
     published, found = MotorParameters(), {}
     for name in FITTED:

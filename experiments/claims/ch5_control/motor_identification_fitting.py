@@ -42,8 +42,8 @@ class Fit:
     `parameters`: fitted motor parameters.  `deviation`: dict from a parameter's name ("lag", "delay", "backlash", "friction") to its
     standard deviations (n,) in s, s, rad and rad/s.  `noise`: standard deviation of the encoder noise, for ticks of 20 ms (NOISE_PERIOD),
     (n,) rad.  `chi_square`: chi-square of the fitted responses per degree of freedom, (n,); 1 if the residuals are only encoder noise.
-    `misfit`: rms residual of the fitted mean response, without the part that noise explains, (n,) rad.  `held_out_chi_square` and
-    `held_out_misfit`: the same for signals that were not fitted.
+    `misfit`: rms difference between the measured mean response and the fitted model, after the mean square of the noise was subtracted,
+    (n,) rad.  `held_out_chi_square` and `held_out_misfit`: the same for signals that were not fitted.
     """
 
     parameters: MotorParameters
@@ -84,7 +84,10 @@ def fit(robot: Robot, responses: Sequence[Responses], signals: tuple[Array, Arra
 
 
 def respond(robot: Robot, parameters: MotorParameters, signal: Array) -> Array:
-    """Return the positions of the motor model without encoder noise, (n, ticks) rad.  `signal`: velocity (ticks,) rad/s for every motor."""
+    """Return the positions of the motor model without encoder noise, (n, ticks) rad.
+
+    `signal`: commanded velocity (ticks,) rad/s, the same for all motors.
+    """
     motors = Motors(robot, parameters, 0, robot.limits.mean(axis=1))
     substeps = parameters.substeps(DT)
     q = np.empty((len(signal), len(robot.motors)))

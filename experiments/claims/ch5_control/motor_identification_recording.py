@@ -109,10 +109,11 @@ class Responses:
 
 
 def postures(model: Model, motor: int, count: int, rng: np.random.Generator) -> Array:
-    """Return home and random postures around it, (count, n) rad, in which a motor has room for the signals.
+    """Return postures in which a motor has room for the signals, (count, n) rad.
 
-    The motor can move by 14 degrees (ROOM) to either side without a limit or a contact; for this its position may differ from home.
-    `motor`: its index.  Raises InvalidValue if too few postures are found.
+    The first candidate is home; the others are random.  In each posture the motor can move by 14 degrees (ROOM) to either side without a
+    limit or a contact.  If it is too near to a limit, its position is changed.  `motor`: its index.  Raises InvalidValue if too few
+    postures are found.
     """
     robot = model.robot
     low, high = robot.limits.T
@@ -151,7 +152,10 @@ def record(body: Backend, robot: Robot, motor: int, at: Array, signals: tuple[Ar
 
 
 def save(path: Path, responses: Responses, at: Array, signals: tuple[Array, Array]) -> None:
-    """Write responses, postures `at` and signals to a file, in SI units.  An interruption leaves no incomplete file."""
+    """Write responses, postures and signals to a file, in SI units.  An interruption leaves no incomplete file.
+
+    `at`: postures (postures, n) rad in which the signals start.  `signals`: the fitted and the held-out signal, (ticks,) rad/s.
+    """
     unfinished = path.with_suffix(".part.npz")
     np.savez_compressed(
         unfinished, fitted=responses.fitted.astype(np.float32), held_out=responses.held_out.astype(np.float32), postures=at,

@@ -2,13 +2,13 @@
 """Push disturbance: an external force at the robot's hand, against which MoBeE gives no guarantee.
 
 Claim: MoBeE protects the robot from itself, not from external energy (thesis 5.2, footnote 4: Justin "can sense when there is too much
-energy in the system ... and apply brakes"; MoBeE has "no such emergency stop").  Measured here: the forces at the hand from which solids
-touch, a constraint is violated or a motor is driven into its stop, and whether the robot returns afterwards.  Source: thesis 5.2, footnote
-4.  Published: no numbers.  Run time: a minute.
+energy in the system ... and apply brakes"; MoBeE has "no such emergency stop").  Measured here: the smallest forces at the hand with which
+solid shapes touch, a constraint is violated, or a motor is driven into its stop, and whether the robot returns afterwards.  Source: thesis
+5.2, footnote 4.  Published: no numbers.  Run time: a minute.
 
-A force acts at the left hand for 0.4 s while the controller holds the posture.  The force moves the joints through J^T and the inertia and
-friction of the motors, for which the values of torque-controlled motors are taken; the controller senses only the joint positions.  With
-MoBeE off, the same force acts on a robot that does not react.
+A force acts at the left hand for 0.4 s while the controller holds the posture.  The force causes joint torques through J^T, which move the
+motors against inertia and friction.  Inertia and friction have the values of torque-controlled motors.  The controller senses only the
+joint positions.  With MoBeE off, the same force acts on a robot that does not react.
 """
 
 from __future__ import annotations
@@ -105,10 +105,11 @@ def push_hand(law: str, direction: str, force: float, seed: int) -> dict[str, An
     `law`: name of the gain set, or "off": the commanded velocity is always 0.  `direction`: a key of DIRECTIONS.  `force`: N.  `seed`: of
     the plant.
 
-    Keys: "moved_mm" and "away_mm", largest and last distance of the hand from its start; "solid_mm" and "beside_mm", depth of contacts of
-    solids, for the pairs of shapes that the simulator tests too, and for all other pairs; "pair", the deepest of the tested pairs;
-    "field_mm", depth of contacts of fields, volumes that are not solid; "clause_deg", violation of a constraint, negative inside;
-    "stop_deg_s", fastest impact at a hard stop.
+    Keys: "moved_mm" and "away_mm", largest and last distance of the hand from its start; "solid_mm", depth of the deepest contact of two
+    solid shapes, among the pairs of shapes that the simulator tests too; "pair", the names of these two shapes; "beside_mm", the same depth
+    among all other pairs of solid shapes; "field_mm", depth of the deepest contact of fields, larger volumes that cause repulsive forces;
+    "clause_deg", largest violation of a constraint [degrees], negative if none is violated; "stop_deg_s", fastest impact at a hard stop
+    [degrees/s].
     """
     gains = Gains.named("default" if law == "off" else law)
     if law == "off":
@@ -138,12 +139,13 @@ def push_hand(law: str, direction: str, force: float, seed: int) -> dict[str, An
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the results as a dict from the control law to a dict from the direction to numbers by name, and "passed".
+    """Return the results as a dict with a key for each control law, and the key "passed".
 
-    "solids_touch_from_N", "constraint_violated_from_N" and "motor_into_its_stop_from_N": smallest force [N] with this event; None if it did
-    not occur.  "deepest_solid_mm": depth of the deepest solid contact.  "back_within_mm": distance of the hand from its start at the end of
-    a run, the largest one after forces of at most 5 N.  "passed": whether with the default gains forces of at most 5 N cause no contact of
-    solids and no violation, and the hand returns to within 5 mm; None if these were not run.
+    Under a control law there is a dict from the direction of the push to a dict with the following numbers.  "solids_touch_from_N",
+    "constraint_violated_from_N" and "motor_into_its_stop_from_N": smallest force [N] with this event; None if it did not occur.
+    "deepest_solid_mm": depth of the deepest solid contact.  "back_within_mm": distance of the hand from its start at the end of a run, the
+    largest one after forces of at most 5 N.  "passed": whether with the default gains forces of at most 5 N cause no contact of solids and
+    no violation, and the hand returns to within 5 mm; None if these were not run.
     """
     pushes = _pushes(found)
     table = {law: {direction: _summary(mine) for (of, direction), mine in pushes.items() if of == law} for law in LAWS}

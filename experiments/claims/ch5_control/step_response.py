@@ -108,11 +108,13 @@ def _posture(number: int, seed: int) -> Array:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the results as a dict from the gain set to a dict from the control period and "motors" or "postures" to numbers, and "passed".
+    """Return the results as a dict with a key for each gain set, and the keys "passed" and "each".
 
-    The numbers are the counts "steps" and "never_settled", and for "settling_time_s", "overshoot", "error_deg" and "rest_deg" a list of the
-    median and the worst value.  "each": the text "median and worst".  "passed": whether all steps with the default gains settle, with at
-    most 5 % overshoot, within 3 s (single motor) or 6 s (posture); None if the default gains were not run.
+    Under a gain set there is a dict from the control period and the kind of step, as "10 ms, motors" or "10 ms, postures", to a dict of
+    numbers: the counts "steps" and "never_settled", and for "settling_time_s", "overshoot" (share of the step), "error_deg" (distance of
+    the end position from the attractor) and "rest_deg" (standard deviation in the last second) a list of the median and the worst value.
+    "each": the text "median and worst".  "passed": whether all steps with the default gains settle, with at most 5 % overshoot, within 3 s
+    (single motor) or 6 s (posture); None if the default gains were not run.
     """
     responses = _responses(found)
     table: dict[str, Any] = {}

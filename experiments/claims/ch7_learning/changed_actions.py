@@ -10,7 +10,8 @@ The world is a table of outcomes: the lattice of rank 3 (81 states), with action
 succeeds.  After 2000 transitions a random state and two of its neighbours are blocked: all actions towards these states end in the state in
 which they began.  1000 more transitions follow.  The error of the model is the mean L1 distance between its outcome probabilities (by the
 observed counts, without the imagined outcomes of the prior) and the true ones; it is computed for the actions into blocked states, and for
-all other actions.  In half of the runs nothing changes.
+all other actions.  In half of the runs nothing changes.  The agent that detects changes estimates the run length of each action: the number
+of observations of this action since its outcomes changed last.  It forgets older observations.
 """
 
 from __future__ import annotations
@@ -51,8 +52,8 @@ MARGIN = 0.01  # of the error in a world that does not change
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
     """Return the settings of the runs: each of four agents, in a world that changes and in one that does not.
 
-    The agents forget nothing, forget with the factors .95 and .8, or detect changes by run lengths.  With --quick the runs have a quarter
-    of the transitions.
+    The agents forget nothing, forget with the factors .95 and .8, or forget the observations from before a detected change ("run length").
+    With --quick the runs have a quarter of the transitions.
     """
     share, name = (4, "quick-") if arguments.quick else (1, "")
     return [
@@ -67,11 +68,11 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Let one agent explore before and after the change, and measure the error of its model.
 
-    Returns `errors` (checks + 1, 2), mean L1 errors against the outcomes after the change.  Row 0 is measured at the change, row i after 20
-    i more transitions.  Column 0: changed actions (0 in a world that does not change); column 1: all other actions.  `tries` is the mean
-    number of tries of a changed action since the change, divided by that of all actions that can be tried (1 in a world that does not
-    change).  `settings`: "agent", a key of AGENTS; "changed", whether the world changes; "before" and "after", numbers of transitions.
-    `seed`: of agent and world.
+    Returns `errors` (checks + 1, 2), mean L1 errors against the outcomes after the change.  Row 0 is measured at the change, row i after i
+    further periods of 20 transitions.  Column 0: changed actions (0 in a world that does not change); column 1: all other actions.  `tries`
+    is the mean number of tries of a changed action since the change, divided by the mean of all actions that do not start in a blocked
+    state (1 in a world that does not change).  `settings`: "agent", a key of AGENTS; "changed", whether the world changes; "before" and
+    "after", numbers of transitions.  `seed`: of agent and world.
     """
     space, rng = arm_space(), np.random.default_rng([seed, 726])
     middle = int(rng.integers(len(space)))

@@ -8,12 +8,12 @@ Run time: 3 minutes on 2 cores.
 
 The left arm explores the lattice of rank 3 (81 states).  After 3000 transitions its world changes: either a ball with a radius of 6 cm
 appears where the hand is in the middle state, or the friction of the elbow doubles from 4 deg/s, with which the joint still reaches its
-goals, to 8 deg/s, with which it sticks.  3000 more transitions follow, from home.  With friction no action settles, because the controller
-continues to drive the motor; such actions end after 8 s.  Walks through both worlds, before and after the change, measure which actions
-changed.  The error of the model is the mean L1 error of its debiased counts (observed counts without the imagined outcomes of the prior)
-over the changed actions, divided by the error at the change.  Forgetting limits the sum of an action's counts to 1 / (1 - forgetting), and
-so keeps its reward above a bound: with the factor 0.8 the action with the most different outcomes always has the highest reward, and a
-curious agent seldom tries others.
+goals, to 8 deg/s, with which it sticks.  3000 more transitions follow, from home.  In the runs with friction no action settles, because the
+controller continues to drive the elbow; the actions end at the time limit of 8 s.  Walks through both worlds, before and after the change,
+measure which actions changed.  The error of the model is the mean L1 error of its debiased counts (observed counts without the imagined
+outcomes of the prior) over the changed actions, divided by the error at the change.  Forgetting limits the sum of an action's counts to 1 /
+(1 - forgetting), so that its reward does not decrease to 0.  With the factor 0.8, the action with the largest number of different outcomes
+always has the highest reward, and a curious agent seldom tries others.
 """
 
 from __future__ import annotations
@@ -125,10 +125,10 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Let one agent explore before and after the change, and measure its model after every 50 transitions.
 
     Returns `seen` (T, 3), the transitions: state, action, state reached.  `series` (checks, 4): the mean L1 error of the changed and of the
-    unchanged actions, then the mean value [nats] of both.  `at_change`: the error of the changed actions before the first transition after
-    the change.  `changed`, `same`: the masks (S, A) of `compare`.  Raises InvalidValue if no action is changed.  `settings`: "change", a
-    key of CHANGES; "explorer"; "forgetting", the factor with which the agent forgets; "transitions", their number before the change, and
-    after it.  `seed`: of agent and plant.
+    unchanged actions, then the mean value [nats] of the changed and of the unchanged actions.  `at_change`: the mean L1 error of the
+    changed actions against their new outcomes, before any transition in the changed world.  `changed`, `same`: the masks (S, A) of
+    `compare`.  Raises InvalidValue if no action is changed.  `settings`: "change", a key of CHANGES; "explorer"; "forgetting", the factor
+    with which the agent forgets; "transitions", their number before the change, and after it.  `seed`: of agent and plant.
     """
     change, known = settings["change"], truths(settings["change"])
     changed, same = compare(*known)
@@ -171,9 +171,10 @@ def summary(values: dict[str, Any]) -> dict[str, Any]:
 class Run:
     """The results of one run: its model was checked after every 50 transitions, and the world changed in the middle.
 
-    `tried` (checks,): number of transitions with a changed action since the previous check.  `series` (checks, 4): mean L1 error of changed
-    and of unchanged actions, then mean value [nats] of both.  `at_change`: error of the changed actions before the first transition after
-    the change.  `changed`, `same`: masks (S, A) of the changed and the unchanged actions.
+    `tried` (checks,): number of transitions with a changed action since the previous check.  `series` (checks, 4): mean L1 error of the
+    changed and of the unchanged actions, then mean value [nats] of the changed and of the unchanged actions.  `at_change`: mean L1 error of
+    the changed actions against their new outcomes, before any transition in the changed world.  `changed`, `same`: masks (S, A) of the
+    changed and the unchanged actions.
     """
 
     tried: Ints
@@ -189,31 +190,34 @@ class Run:
 
     @property
     def tries(self) -> Array:
-        """Mean tries of a changed action since the previous check, divided by the mean tries of all actions, for each check, (checks,)."""
+        """Relative number of tries of a changed action between two checks, one number for each check, (checks,).
+
+        This is the mean number of tries of the changed actions since the previous check, divided by the mean of all actions.
+        """
         relative: Array = self.tried / CHECK_PERIOD * arm_space().state_actions / self.changed.sum()
         return relative
 
     @property
     def tries_after(self) -> float:
-        """The mean of `tries` in the first 500 transitions after the change."""
+        """The mean of `tries`, the relative number of tries of a changed action, in the first 500 transitions after the change."""
         return float(self.tries[self.checks_before : self.checks_before + WINDOW // CHECK_PERIOD].mean())
 
     @property
     def tries_before(self) -> float:
-        """The mean of `tries` in the last 500 transitions before the change."""
+        """The mean of `tries`, the relative number of tries of a changed action, in the last 500 transitions before the change."""
         return float(self.tries[self.checks_before - WINDOW // CHECK_PERIOD : self.checks_before].mean())
 
     @property
     def value_jump(self) -> float:
-        """The largest value of the changed actions in the first 500 transitions after the change, over their last value before it.
+        """The largest value of the changed actions in the first 500 transitions after the change, divided by their last value before it.
 
-        A value at a check is the mean value of all changed actions.
+        The values are recorded at the checks, after every 50 transitions; each is the mean over all changed actions.
         """
         return self._jump(self.checks_before)
 
     @property
     def value_jump_before(self) -> float:
-        """The ratio of `value_jump`, computed from the last 500 transitions before the change, when nothing has changed, for comparison.
+        """The same ratio as `value_jump`, but for the last 500 transitions before the change; it serves for comparison.
 
         It is the largest value of the changed actions in these transitions, divided by their value just before these transitions.
         """
@@ -242,7 +246,7 @@ class Run:
 
     @property
     def relearned_within(self) -> float:
-        """The same number as `relearned`, but with the number of all transitions after the change instead of inf."""
+        """The same number as `relearned`; if the error is never halved, the number of all transitions after the change."""
         return float(min(self.relearned, CHECK_PERIOD * (len(self.series) - self.checks_before)))
 
 

@@ -7,15 +7,16 @@ Source: aim of this reproduction, the table discovery of paper 3.2 one step furt
 Run time: 4 minutes of processor time.
 
 The left arm has 15 postures in which the hand is low above the table, and the cup can be in nine cells of 5 x 8 cm: 135 states, 396
-actions.  The contacts of hand and cup have no friction (`mobee.SlidingObject`), so that the cup slides off the hand; it is put back to the
-middle when it topples or leaves the cells.  Its place is perceived with an error of 3 mm.  In all runs a real cup stands there, and its
-motions are counted.  The runs differ in what the agent perceives as the place of the cup: the true place; a ghost that rests at the first
-place; or a ghost that repeats the motion of the cup in another run, so that the agent's actions do not cause it.
+actions.  The contacts of hand and cup have no friction (`mobee.SlidingObject`), so that the cup slides off the hand; it is put back to its
+first place, in the middle cell, when it topples or leaves the cells.  Its place is perceived with an error of 3 mm.  In all runs a real cup
+stands there, and its motions are counted.  The runs differ in what the agent perceives as the place of the cup: the true place; a ghost
+that rests at the first place; or a ghost that repeats the motion of the cup in another run, so that the agent's actions do not cause it.
 The replayed ghost is the stricter control: its agent has as many states, and as much to learn, as the one that perceives the cup.  An
 action has moved the cup if it pushed it by more than 1 cm or made it fall.
 After 2000 actions, the agent plans with its transition model to push the cup from the middle to each of the five cells to which the hand
 can push it, each six times, with at most 20 actions.
---arrangements: also other postures, and twelve cells with the cup beside their middle.
+--arrangements: also runs with other postures, and with a grid of twelve cells, in which the first place of the cup is beside the middle of
+the grid.
 """
 
 from __future__ import annotations
@@ -58,9 +59,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
     """Return the settings of the runs: each of four agents in the first arrangement, or with --arrangements in all three.
 
-    An arrangement is a set of postures of the hand and a grid of cells on the table.  Three agents are curious and perceive the cup, a
-    ghost of it at rest, or a ghost that repeats the motion of another run; one acts at random.  With --quick the runs have 60 actions and
-    two tries to push the cup to a cell.
+    An arrangement is a set of postures of the hand and a grid of cells on the table.  Three agents are curious.  The first perceives the
+    true place of the cup.  The second and the third perceive the place of an imaginary cup (a ghost) instead: one that rests, or one that
+    repeats the motion of the cup in another run.  The fourth agent acts at random.  With --quick the runs have 60 actions, and then two
+    tries to push the cup to a cell.
     """
     transitions, tries, name = (QUICK, 2, "quick-") if arguments.quick else (TRANSITIONS, TRIES, "")
     return [
@@ -79,9 +81,9 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Explore beside the cup, and then try to push the cup to chosen cells.
 
     Returns for each of the T actions whether it moved the cup, `moved` (T,), and whether the cup fell, `fell` (T,); `path`, the length of
-    the cup's path [m]; `reached` (tries,), for each try to push the cup to a chosen cell by plans, whether it got there; and, only for the
-    random agent, `by_chance` (tries,), the same for tries by random actions.  `settings`: "arrangement", a key of ARRANGEMENTS; "agent", a
-    key of AGENTS; numbers of "transitions" and of "tries".  `seed`: of agent and plant.
+    the cup's path in these actions [m]; `reached` (tries,), whether the cup reached the chosen cell in each try that follows plans; and,
+    only for the random agent, `by_chance` (tries,), the same for tries with random actions.  `settings`: "arrangement", a key of
+    ARRANGEMENTS; "agent", a key of AGENTS; numbers of "transitions" and of "tries".  `seed`: of agent and plant.
     """
     arrangement = ARRANGEMENTS[settings["arrangement"]]
     explorer, perceived = AGENTS[settings["agent"]]
@@ -134,9 +136,10 @@ ROW: dict[str, Callable[[Mapping[str, Any]], float]] = {
 
 
 def pushed(runs: Runs) -> dict[str, list[float]]:
-    """Return for each kind of tries a list with one number per run: the share of the tries in which the cup got to the chosen cell.
+    """Return how often the cup was pushed to the chosen cell: by planned and by random actions, a list with the share of each run.
 
-    The kinds, keys of the dict, are "AGENT, then plans", for plans with the model that the agent has learned, and "random actions".
+    The key "AGENT, then plans" (with the name of an agent) is for tries that follow plans with the model that this agent has learned; the
+    key "random actions" is for tries with random actions.
     """
     learned = {f"{agent}, then plans": group for agent, group in runs.items()}
     return of_each(learned, lambda run: float(run["reached"].mean())) | {
@@ -147,8 +150,8 @@ def pushed(runs: Runs) -> dict[str, list[float]]:
 def findings(found: Cells) -> dict[str, Any]:
     """Return the results as a dict with two keys, "agents" and "claims".
 
-    "agents" is a dict from "arrangement: agent" to a row: "seeds", and means of the numbers in ROW; an arrangement is a number of postures
-    of the hand and of cells on the table.  "claims" is a list with the claims, their measured values and their verdicts, as dicts
+    "agents" is a dict from "arrangement: agent" to a row: "seeds", and means of the numbers in ROW; an arrangement is a set of postures of
+    the hand and a grid of cells on the table.  "claims" is a list with the claims, their measured values and their verdicts, as dicts
     (`Claim.record`).  If not every agent was run in full in the first arrangement, all claims stay unmeasured and are not judged.
     """
     groups = grouped_by(found, "arrangement", "agent")

@@ -13,8 +13,8 @@ joint).  If several states are equally near, a draw decides which of them are am
 on the explorer, so that 50 seeds have 50 graphs.  Each explorer makes its own draws among equally good actions.  The texts do not name the
 discount of figure 4, so the curious agent also runs with 0.5 and 0.99.  For comparison, the shortest walk needs the fewest actions to try
 every action, if all succeed (open Chinese postman problem).  A run stops after 20 000 transitions.  Two explorers are not published but
-ours: "nearest untried" moves to the nearest untried action; "depleting" is curiosity that expects an action's reward to fall with each try
-that its own plan contains.
+ours: "nearest untried" moves to the nearest untried action; "depleting" is a curious agent that expects the reward of an action to decrease
+with each try of this action in its own plan.
 """
 
 from __future__ import annotations
@@ -103,10 +103,11 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Explore until every action was tried, at most 20 000 transitions.
 
-    Returns `state_actions`, the number of actions; `floor`, the length of the shortest walk over all of them; `new_actions` (E,), the
-    numbers (from 1) of the transitions that tried an action for the first time; `new_states`, the numbers of the transitions that reached a
-    state for the first time, and 0 for the state at the start; the number of `transitions`; and `failed`, the share that did not end in
-    their goal.  `settings`: "explorer"; "graph", a key of GRAPHS; "world", one of WORLDS; "discount".  `seed`: of agent, graph and plant.
+    Returns `state_actions`, the number of actions; `floor`, the length of the shortest walk that takes each of them; `new_actions` (E,),
+    the indices (from 1) of the transitions that tried an action for the first time; `new_states`, 0 for the state at the start, then the
+    indices (from 1) of the transitions that reached a state for the first time; `transitions`, their number; and `failed`, the share of
+    transitions that did not end in the goal of their action.  `settings`: "explorer"; "graph", a key of GRAPHS; "world", one of WORLDS;
+    "discount".  `seed`: of agent, graph and plant.
     """
     space = arm_space(neighbours=GRAPHS[settings["graph"]], tie_seed=seed)
     plant = arm_plant(seed, free=settings["world"] == "free")
@@ -133,8 +134,8 @@ def shortest_walk(goals: Ints) -> int:
 
     This is the open directed Chinese postman problem.  If a state has more actions into it than out of it, the walk must repeat actions to
     leave it: it takes a shortest path to a state with more actions out of it than into it.  An assignment of minimal total length pairs the
-    states of the first kind with those of the second kind.  One state of each kind stays without a partner: the walk ends in the one of the
-    first kind, and begins in the one of the second kind.
+    states of the first kind with those of the second kind.  Because the walk is open, one state of each kind needs no partner: the walk
+    ends in the one of the first kind, and begins in the one of the second kind.
     """
     from_state, action = np.nonzero(goals != NO_ACTION)
     to_state, states = goals[from_state, action], len(goals)
@@ -156,9 +157,11 @@ def _distances(from_state: Ints, to_state: Ints, states: int) -> Array:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the results: "runs" is a dict from "graph world agent" to the dict of `row`, "claims" a list with the judged claims, as dicts.
+    """Return the results as a dict with the keys "runs" and "claims".
 
-    The claims are about the published graph, "nearest", and are absent if it was not run.
+    "runs" is a dict from the names of graph, world and agent, as "nearest free curious", to the numbers that `row` returns.  "claims" is a
+    list with the judged claims, as dicts (`Claim.record`).  The claims are about the published graph, "nearest"; if it was not run, there
+    is no key "claims".
     """
     grouped = by_agent(found)
     results: dict[str, Any] = {"runs": {" ".join(key): row(runs) for key, runs in sorted(grouped.items())}}
@@ -209,16 +212,17 @@ def first_repeat(run: Mapping[str, Any]) -> int:
 
 
 def states_seen(run: Mapping[str, Any], transitions: int) -> int:
-    """Return the number of states that a run visited in its first `transitions` transitions, with the state at the start."""
+    """Return the number of states that a run visited in its first `transitions` transitions, including the state at the start."""
     return int((run["new_states"] <= transitions).sum())
 
 
 def row(runs: Runs) -> dict[str, Any]:
     """Summarise runs with the same settings.  Returns a dict from a label to a number.
 
-    The labels name the number of runs ("seeds") and of those that were "unfinished"; the mean number of "transitions" with the interval
-    "low" to "high", and the same mean "over_shortest_walk"; the "first_repeat" of an action; the states seen early; and the share of failed
-    actions.
+    The labels are "seeds", the number of runs; "unfinished", the number of runs that ended before every action was tried; "transitions",
+    the mean length of a run, with its confidence interval "low" to "high"; "over_shortest_walk", the mean length divided by that of the
+    shortest walk; "first_repeat", the number of the first transition that repeats an action; "states_seen_after_220" transitions; and
+    "share_of_failed_actions".  Means are interquartile means.
     """
     low, high = interval(covered(runs))
     return {
@@ -328,10 +332,10 @@ near_floor = {
     "at most 1.01",
 )
 def depletes(published: Published) -> Measured | None:
-    """Judge whether the explorer "depleting" tries every action about as soon as "nearest_untried", in both worlds.
+    """Judge whether "depleting" needs at most 1.01 times the transitions of "nearest_untried" to try every action, in both worlds.
 
-    `published`: runs on the published graph by (world, agent).  Returns the ratios of their transitions as text, and the verdict: the ratio
-    must be at most 1.01.  Returns None if one of the explorers was not run.
+    `published`: runs on the published graph by (world, agent).  Returns the ratio of these numbers of transitions in each world as text,
+    and the verdict.  Returns None if one of the two explorers was not run.
     """
     if any((world, name) not in published for world in FLOORS for name in ("depleting", "nearest_untried")):
         return None

@@ -7,7 +7,8 @@ Source: paper 3.1, fig. 5 (one run of the real robot per explorer).  No numbers 
 
 The left arm with its cable constraints and self-contacts; 81 states with actions to their 16 nearest neighbours, and for comparison to
 their equidistant ones.  Ties among the 16 nearest are drawn once: all runs share that graph, and the numbers may depend on it.  Actions at
-constraints are those that fail in more than half of the tries of all explorers together, without the tries of the run that is judged.
+constraints are those that failed in more than half of all their tries, in the runs of all explorers on a graph together.  When a run is
+judged, its own tries are left out.
 """
 
 from __future__ import annotations

@@ -64,8 +64,8 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
     Returns for the (16, 4) actions their tries and values [nats] after 50 transitions, `early_tries` and `early_values`, and at the end,
     `tries`, `values` and expected `rewards`; the transitions `seen` (T, 3), their number `transitions`, and how many of them `failed`; and
-    `all_once`, the number of transitions until every action was tried once (None: not every one was).  `settings`: "discount" and
-    "initial", as for `CuriousAgent`.  `seed`: of agent and plant.
+    `all_once`, the number of transitions until every action was tried once, or None if some action was not tried.  `settings`: "discount"
+    and "initial", as for `CuriousAgent`.  `seed`: of agent and plant.
     """
     space, plant = arm_space(HYPERCUBE), arm_plant(seed)
     begin_anywhere(space, plant, seed)

@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compare two information gains as rewards: the thesis' 'Kail' divergence, and the KL divergence from a uniform prior over all states.
 
-'Kail' divergence counts outcomes in bins whose number grows with the outcomes that were seen.
+'Kail' divergence is computed over the bins of an action: one for the start (failure), one for the goal (success), and one for each other
+state that it has led to.
 Claim: with the plain KL divergence and a uniform prior every first try has the same reward, so that many tries are needed to distinguish
 failing actions from reliable ones; and rewards are larger in small state spaces than in large ones.  The 'Kail' divergence has neither
 problem.  Source: thesis 6.4.2 and 6.4.3, eqs. 6.6 to 6.9, tables 6.1 to 6.4.  Run time: half a minute on 2 cores.
 
 First the rewards of a reliable, a failing and an uncertain action are computed, try by try.  Then curious agents explore with both
 divergences: the left arm with its constraints (81 states with 16 neighbours) makes 4000 transitions, and the torso (27 states with 8
-neighbours) 900; all runs of a part have the same graph.  Failing actions are those that fail in more than half of the tries of all runs
-except the judged one.
+neighbours) 900; all runs of a part have the same graph.  In the claims, the failing actions of a run are those that failed in more than
+half of all their tries in the other runs of the arm.
 """
 
 from __future__ import annotations
@@ -137,9 +138,9 @@ def rewards(part: str, divergence: str, outcome: Outcome, repeats: int = REPEATS
 def tries_to_prefer(part: str, divergence: str, kind: str) -> float:
     """Return the mean number of tries after which an action of the kind `kind` has a larger reward than a reliable action.
 
-    Both actions are tried equally often, and their last rewards are compared; larger means by more than 5 %.  `part`: "left_arm" or
-    "torso".  `divergence`: the one that defines the reward, "kail" or "kl".  `kind`: "failing" or "uncertain".  inf if 30 tries do not
-    suffice in some repetition.
+    Both actions are tried equally often, and the rewards of their last tries are compared.  A reward is larger if it exceeds the other by
+    more than 5 %.  `part`: "left_arm" or "torso".  `divergence`: the one that defines the reward, "kail" or "kl".  `kind`: "failing" or
+    "uncertain".  Returns inf if 30 tries were not enough in one of the simulations.
     """
     other = rewards(part, divergence, KINDS[kind])
     plain = rewards(part, divergence, reliable, repeats=1)[0]

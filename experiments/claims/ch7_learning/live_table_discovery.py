@@ -8,10 +8,11 @@ run.
 
 The robot is `icub` with the published gains and graphs; contact forces act on all motors up to the root of the robot.  The live robot is
 its motor model, or with --robots PyBullet or MuJoCo; the motor parameters of the offline plant were identified on PyBullet.  The models are
-compared by the total variation between the outcomes that were observed live and those of all offline seeds but one, mean over the
-state-actions that both tried at least twice; the same numbers are computed for each offline seed.  Touch is the share of the arms' actions
-that ended in contact with table or ball; lean is the mean number of tries of the torso's actions that lean forward, over that of its other
-actions; both are measured in the second half of a run.
+compared by the total variation between the outcomes of a live run and those of all offline runs except one, which are taken together.  Each
+offline run is left out in turn, and the results are averaged.  The variation is a mean over the state-actions that both sides tried at
+least twice.  For comparison, the variation between each offline run and all others is computed, too.  Touch is the share of the arms'
+actions that ended in contact with table or ball.  Lean is the mean number of tries of the torso's actions that lean forward, divided by the
+mean number of tries of its other actions.  Both are measured in the second half of a run.
 With the same encoder noise the live and the offline plant make exactly the same run (`mobee bench agree`); here they have different seeds.
 """
 
@@ -97,7 +98,7 @@ def live_cells(arguments: argparse.Namespace) -> list[Cell]:
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
     """Learn on the offline plant and on the live system, and return the results of the comparison.
 
-    Live cells run one after the other.  Cells that are already in the folder are not repeated.
+    The live runs are made one after the other.  Runs whose results are already in the folder are not repeated.
     """
     run_cells(learn_offline, offline_cells(arguments), folder, arguments)
     one_by_one = copy(arguments)
@@ -107,7 +108,9 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 def learn_in_system(cell: Cell) -> dict[str, Any]:
-    """Learn on the live system, in a cell with the settings `task`, `transitions` and `robot`.
+    """Let the agents learn on the live system, in one run.
+
+    `cell`: the run; its settings are "task", "transitions" (of each agent) and "robot".
 
     Returns for each part the transitions, `seen_PART` (T, 3), and whether each ended in contact with an object, `touched_PART` (T,): the
     same arrays as `experiments.kit.learning.live.learn_offline`.
@@ -120,7 +123,7 @@ def learn_in_system(cell: Cell) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Run:
-    """One run of the three agents, offline or live; `result`: the finished cell with their transitions."""
+    """One run of the three agents, offline or live; `result`: the stored result, with their transitions."""
 
     result: CellResult
 
@@ -146,7 +149,10 @@ class Run:
         return float(tries[forward].mean() / tries[~forward].mean())
 
     def contacts(self, part: str) -> Contacts:
-        """Return counts of a part's actions: all, those that missed their goals, those that ended in contact with an object, and both."""
+        """Count the actions of a part, by how they ended.
+
+        The numbers are: all actions; those that missed their goals; those that ended in contact with an object; and those that did both.
+        """
         return Contacts.of(_spaces()[part], self.result.values[f"seen_{part}"], self.result.values[f"touched_{part}"])
 
 
@@ -171,8 +177,8 @@ def distances(runs: Runs) -> dict[str, list[Distance]]:
     """Return a dict from the robot (or "offline") to the distance of the outcomes in each of its runs from those in the offline runs.
 
     A distance has the mean total variation of the outcomes of an action, and the share of actions with the same most frequent outcome.  An
-    offline run is compared with all other offline runs together.  A live run is compared with all offline runs except one, and the distance
-    is averaged over the run that is left out.
+    offline run is compared with all other offline runs together.  A live run is compared with all offline runs except one.  Each offline
+    run is left out in turn, and the distances are averaged.
     """
     offline = [run.counts for run in runs[OFFLINE]]
     together = {part: np.sum([counts[part] for counts in offline], axis=0) for part in offline[0]}
@@ -188,7 +194,8 @@ def distances(runs: Runs) -> dict[str, list[Distance]]:
 class Found(NamedTuple):
     """All finished runs, with their distances from the offline runs.
 
-    `runs`: by robot, and under "offline".  `apart`: distance of each of these runs, in the same order.
+    `runs`: by robot, and under "offline".  `apart`: for each of these runs, in the same order, how far its outcomes are from those of the
+    offline runs, as in `distances`.
     """
 
     runs: Runs
@@ -287,9 +294,10 @@ def _live(groups: Mapping[str, Any]) -> list[str]:
 
 
 def figure(folder: Path) -> Path:
-    """Draw the distance of every run from the offline runs, and how often its agents touched the table and leant forward.
+    """Draw for each run the distance of its outcomes from the offline runs, and how often the agents touched the table and leant forward.
 
-    Returns the path of the picture in the folder.
+    The distance is the mean total variation (see `distances`); the other numbers are `Run.touch` and `Run.lean`.  Returns the path
+    of the picture in the folder.
     """
     runs = runs_in(folder)
     panels = {"mean total variation a state-action": {name: [d.variation for d in group] for name, group in distances(runs).items()}}

@@ -9,10 +9,10 @@ Run time: two minutes on 2 cores.
 The left arm of the published robot learns on 81 states with 16 neighbours: 4000 curious transitions without the table ("still") or with a
 table that is moved up or down at random after every ten actions ("moving"); or 2000 transitions without the table before it is raised
 ("enters").  Then the model is tested in 60 queries, pairs of a start and a goal state.  It learns nothing from them, and plans again after
-each action, with debiased counts (without the imagined outcomes of the prior).  In each query the raised table blocks the straight path
-between start and goal, but neither of them.  For comparison the same lattice is used as a roadmap that was verified without the table.  Its
-path is planned once, or the roadmap is repaired when a motion fails, only for this query ("repairs") or for all later queries too
-("remembers").
+each action, with debiased counts (observed counts and a weak prior, without the imagined outcomes of the learner).  In each query the arm
+would touch the raised table on the straight path from start to goal, but not in the start or in the goal.  For comparison the same lattice
+is used as a roadmap that was verified without the table.  Its path is planned once, or the roadmap is repaired when a motion fails, only
+for this query ("repairs") or for all later queries too ("remembers").
 The seeds draw noise and queries; all runs share one graph.
 """
 
@@ -80,14 +80,15 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
     `settings`: "training": "still" (without the table), "moving" (the table moves up and down), "enters" (the table is raised after 2000
     transitions, and the agent continues to learn), or "roadmap" (no training); "queries", their number, each a start state and a goal
-    state; "share" of the usual number of transitions; for "enters" also "forgetting", the factor with which the agent forgets.
+    state; "share", the factor by which the usual numbers of transitions are multiplied; for "enters" also "forgetting", the factor with
+    which the agent forgets.
 
     `seed`: of agent, plant and queries.  The keys of the result depend on "training".  For "roadmap": "tests", a dict from the planner
     ("planned once", "repairs", "remembers") to a dict from the position of the table in the queries ("down", "moving", "up") to a dict of
-    measures, as in `tested`.  For "still" and "moving": "tests", with the planner "plans"; "seen", the transitions (T, 3); "fates", the
-    counts that `fates` returns; and the learned model, "outcomes" and "probabilities" (S, A, B), with B possible outcomes of a
-    state-action.  For "enters": "after", numbers of transitions since the table was raised; and "rows", a dict of measures with the raised
-    table for each of them.
+    measures, as in `tested`.  For "still" and "moving": "tests", in the same form, with "plans" as the only planner; "seen", the
+    transitions (T, 3); "fates", the counts that `fates` returns; and the learned model, "outcomes" and "probabilities" (S, A, B), with B
+    possible outcomes of a state-action.  For "enters": "after", numbers of transitions since the table was raised; and "rows", a dict of
+    measures with the raised table for each of them.
     """
     condition, share, space = settings["training"], settings["share"], arm_space(RANK3, ARM_NEIGHBOURS)
     plant = TablePlant(seed, moves=condition == "moving")
@@ -126,10 +127,10 @@ def _entered(agent: CuriousAgent, plant: TablePlant, queries: Queries, share: fl
 
 
 def fates(model: TransitionModel) -> dict[str, int]:
-    """Count the state-actions that were tried at least twice, by where they end with a probability of at least 0.8.
+    """Count where the state-actions end, for all state-actions that were tried at least twice.
 
-    The keys are "tried", for all of them; "goal", for those that end in their goal; "elsewhere", for those that end in one other state; and
-    "sometimes", for those in which no state has this probability.
+    The keys are "tried", the number of all these state-actions; "goal", of those that end in their goal with a probability of at least 0.8;
+    "elsewhere", of those that end in one other state with a probability of at least 0.8; and "sometimes", of the rest.
     """
     beliefs, space = model.debiased(), model.space
     tried = model.tries >= MIN_TRIES
@@ -161,19 +162,20 @@ def tested(runs: Runs, condition: str, test: str, measure: str, mode: str = "pla
     """Return a measure of the queries of each run, (seeds,).
 
     `condition`: "still", "moving" or "roadmap".  `test`: position of the table, "down", "moving" or "up".  `measure`: "success", share of
-    queries; "actions", per query; "touched", share of actions that end at the table; "met", share of queries with such an action; and for
-    the MDP "promised", the predicted probability that a plan is followed, "kept", the share of plans that are followed, and "through", the
-    share of states on the path in which the raised table is.  `mode`: "plans" for the MDP; for a roadmap "planned once", "repairs" or
-    "remembers".
+    queries that reach their goal state; "actions", mean number of actions of a query; "touched", share of actions that end in contact with
+    the table; "met", share of queries with such an action; and for the MDP "promised", the predicted probability that all actions of a plan
+    end as planned, "kept", the share of queries that passed exactly the planned states, and "through", the share of states on the paths in
+    which the arm would touch the raised table.  `mode`: "plans" for the MDP; for a roadmap "planned once", "repairs" or "remembers".
     """
     return np.array([run["tests"][mode][test][measure] for run in runs[condition, None]])
 
 
 def entering(runs: Runs, forgetting: float) -> tuple[list[int], dict[str, Array]]:
-    """Return the numbers of transitions since the table was raised at which plans were tested, and the measures of these tests.
+    """Return when plans were tested after the table had been raised, and the measures of these tests.
 
-    `forgetting`: the factor with which the agents forget; 1: nothing is forgotten.  The measures are a dict from the name, as in `tested`,
-    to values (seeds, points), a column for each number of transitions.
+    The times are a list of the numbers of transitions since the table was raised.  `forgetting`: the factor with which the agents forget;
+    1: nothing is forgotten.  The measures are a dict from the name, as in `tested`, to values (seeds, points), a column for each number of
+    transitions.
     """
     group = runs["enters", forgetting]
     return list(group[0]["after"]), {m: np.array([[point[m] for point in run["rows"]] for run in group]) for m in MEASURES}
@@ -327,12 +329,12 @@ def _entering(axes: Any, runs: Runs, measure: str) -> None:
 
 
 def draw_arrows(axes: Any, space: Lattice, outcomes: Ints, probabilities: Array) -> None:
-    """Draw the transition model of a rank 3 arm as in fig. 7 of the paper: states as points, outcomes as arrows.
+    """Draw the transition model of an arm with three levels of each joint as in fig. 7 of the paper: states as points, outcomes as arrows.
 
-    `outcomes`, `probabilities`: (S, A, B).  Pitch and elbow vary within a block, roll and yaw from block to block.  Grey lines are all
-    state-actions.  A state-action with a probability of at least 0.3 of ending neither in its goal nor where it starts has a colour of its
-    own, and an arrow to each other state with a probability of 0.08 or more; the width of an arrow is the probability.  `axes`: of
-    Matplotlib.
+    `outcomes`, `probabilities`: (S, A, B).  Pitch and elbow vary within a block, roll and yaw from block to block.  For each state-action a
+    grey line joins its start and its goal.  A state-action is coloured if it ends with a probability of at least 0.3 in one state that is
+    neither its goal nor its start.  Each coloured state-action has an arrow to every outcome with a probability of at least 0.08, except to
+    its start; the width of an arrow is proportional to the probability.  `axes`: of Matplotlib.
     """
     from matplotlib import colormaps
     from matplotlib.collections import LineCollection

@@ -10,8 +10,9 @@ the left arm on 81 and on 256 states (20-80 % of the ranges), with equidistant n
 world that is defined by a table of outcome probabilities, so that the truth is known exactly.  In this world a plane separates three of 81
 states from the others ("half-space").  The arm's true outcomes are estimated by walks that try every action 80 or 40 times.  An action is
 stochastic if its most likely outcome has a probability below .9: none of 432 on the arm with 81 states, some 25 of 1536 with 256, 13 of 432
-in the half-space.  An estimate of the truth from so few tries has an error itself, some .1 for two equally likely outcomes.  No measured
-error can be below it, so that ratios of errors are too small for the stochastic actions of the arm.
+in the half-space.  The truth that is estimated from so few tries has itself an error, some .1 for two equally likely outcomes.  Even a
+perfect model would have this measured error.  Therefore the measured ratio of a large to a small error is smaller than the real ratio, for
+the stochastic actions of the arm.
 """
 
 from __future__ import annotations
@@ -139,9 +140,9 @@ def errors(found: Cells, known: Mapping[str, OutcomeModel]) -> dict[tuple[str, s
     """Return a dict from (world, explorer) to the L1 errors of the models learned in each run, (seeds, times, columns).
 
     `known`: dict from a world to its true outcomes; runs in other worlds are left out.  The times are the numbers of transitions that the
-    function `times` returns.  Columns: 0, mean error over all actions, and 1, over the stochastic ones, of the counts with imagined
-    outcomes (pseudo-counts from before the first try); 2 and 3, the same with debiased counts, which replace the pseudo-counts by a weak
-    prior.
+    function `times` returns.  Columns 0 and 1: mean error over all actions, and over the stochastic ones, of a model whose counts include
+    the imagined outcomes (pseudo-counts from before the first try).  Columns 2 and 3: the same errors of the debiased model, which has a
+    weak prior instead of these pseudo-counts.
     """
     return {
         (world, explorer): np.array([error_curve(world, known[world], one["seen"]) for one in results])
@@ -156,11 +157,12 @@ def times(world: str) -> list[int]:
 
 
 def error_curve(world: str, truth: OutcomeModel, seen: Ints) -> Array:
-    """Learn a model again from recorded transitions, and return its L1 errors at the times of `times`, (times, columns).
+    """Learn a model again from recorded transitions, and return its L1 errors after several numbers of transitions, (times, columns).
 
-    `seen`: (T, 3), state, action, state reached.  Columns 0 and 1: errors with imagined outcomes, pseudo-counts from before the first try,
-    over all and over stochastic actions; columns 2 and 3: the same with debiased counts, which replace the pseudo-counts by a weak prior.
-    NaN at times beyond the last transition, and in the columns of stochastic actions if there are none.
+    The numbers of transitions are those that the function `times` returns.  `seen`: (T, 3), state, action, state reached.  Columns 0 and 1:
+    mean error over all actions, and over the stochastic ones, of the model whose counts include the imagined outcomes (pseudo-counts from
+    before the first try).  Columns 2 and 3: the same errors of the debiased model, which has a weak prior instead of these pseudo-counts.
+    NaN at numbers beyond the last transition, and in the columns of stochastic actions if there are none.
     """
     model, at = TransitionModel(space_of(world)), times(world)
     beliefs = (model, model.debiased())
@@ -175,9 +177,10 @@ def error_curve(world: str, truth: OutcomeModel, seen: Ints) -> Array:
 def findings(found: Cells) -> dict[str, Any]:
     """Return the results as a dict with two keys, "runs" and "claims".
 
-    "runs" is a dict from "world; explorer" to a row after all transitions: "seeds", the number of "stochastic_actions", the errors in
-    COLUMNS, and the error of the estimated truth.  "claims" is a list with the claims, their measured values and their verdicts, as dicts
-    (`Claim.record`).
+    "runs" is a dict from "world; explorer" to a row for the models after all transitions: "seeds", the number of runs;
+    "stochastic_actions", the number of actions whose most likely outcome has a probability below 0.9; the errors in COLUMNS; and
+    "error_of_estimated_truth_stochastic", the error of the estimated true outcomes themselves (`truth_error`).  "claims" is a list with the
+    claims, their measured values and their verdicts, as dicts (`Claim.record`).
     """
     known = truths(found)
     last = {key: curves[:, -1] for key, curves in errors(found, known).items()}
@@ -190,7 +193,7 @@ def findings(found: Cells) -> dict[str, Any]:
 
 
 def truth_error(truth: OutcomeModel) -> float | None:
-    """Return the expected L1 error of the measured true outcomes, as a mean over the stochastic actions.
+    """Return the expected L1 error of the true outcomes themselves, which walks estimate from few tries; mean over the stochastic actions.
 
     Returns 0 if a table defines the outcomes, None if no action is stochastic.  A stochastic action has no outcome with a probability of
     0.9 or more.
@@ -274,10 +277,10 @@ CLAIMS = (
 def plot(found: Cells) -> Any:
     """Draw the L1 error of the learned transition models over the number of transitions: a column for each world, a color per explorer.
 
-    The curves are medians over the seeds.  The upper panels show the mean error over all actions, of two models: a dashed line is the model
-    whose probabilities include the imagined outcomes, which are pseudo-counts from before the first try; a solid line is the model with
-    debiased counts, which replace them by a weak prior.  The lower panels show the mean error of the debiased model over the stochastic
-    actions, whose most likely outcome has a probability below 0.9.  Returns a matplotlib figure.
+    The curves are medians over the seeds.  The upper panels show the mean error over all actions, of two models.  Dashed lines: the counts
+    include the imagined outcomes, which are pseudo-counts from before the first try.  Solid lines: the debiased model, which has a weak
+    prior instead of these pseudo-counts.  The lower panels show the mean error of the debiased model over the stochastic actions, whose
+    most likely outcome has a probability below 0.9.  Returns a matplotlib figure.
     """
     curves = errors(found, truths(found))
     worlds = [world for world in WORLDS if any(key[0] == world for key in curves)]

@@ -6,9 +6,10 @@ Source: paper 4.1 (an impression, no numbers).  Run time: 4 minutes on 2 cores.
 
 The left arm with its cable constraints and self-contacts learns by curiosity on graphs of 81 states, with actions to the 4 to 32 nearest
 states (among equally near ones a draw decides, anew for every seed) or to the equidistant neighbours (states one level away along one
-joint).  After fixed numbers of transitions, its model is tested in 60 tasks, random pairs of states, which are the same for all graphs:
-follow the plan until the arm is in the goal state, with at most 12 actions, on a robot with other noise.  A task is solved directly if it
-takes the fewest actions that its graph allows.  The learning time is the number of transitions until every state-action was tried once.
+joint).  After fixed numbers of transitions, the learned model is tested in 60 tasks, random pairs of states, which are the same for all
+graphs: follow the plan until the arm is in the goal state, with at most 12 actions.  The plant of the tests has other random noise than the
+plant of the learning.  A task is solved directly if it takes the fewest actions that its graph allows.  The learning time is the number of
+transitions until every state-action was tried once.
 """
 
 from __future__ import annotations
@@ -53,12 +54,12 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Learn on one graph, and try the tasks with the learned model after each number of transitions in `budgets`.
+    """Learn on one graph, and test the learned model in the tasks after each number of transitions in "budgets".
 
     Returns for each task whether it was solved, `reached` (budgets, tasks), by how many `actions` (budgets, tasks), and the `fewest`
-    actions that the graph allows (tasks,); `covered`, the transitions until every action was tried (None: one was not); and
-    `state_actions`, the number of actions of the graph.  `settings`: "graph", number of neighbours or "equidistant"; "tasks", their number;
-    "budgets".  `seed`: of agent, graph, tasks and plant.
+    actions that the graph allows (tasks,); `covered`, the number of transitions until every action was tried, or None if some action was
+    not tried; and `state_actions`, the number of actions of the graph.  `settings`: "graph", number of neighbours or "equidistant";
+    "tasks", their number; "budgets".  `seed`: of agent, graph, tasks and plant.
     """
     space, plant = arm_space(neighbours=settings["graph"], tie_seed=seed), arm_plant(seed)
     begin_anywhere(space, plant, seed)
@@ -114,8 +115,8 @@ class Attempt(NamedTuple):
 def attempt(model: TransitionModel, plant: OfflinePlant, start: int, goal: int, most: int) -> Attempt:
     """Move the arm to the state `start`, and follow the model's plan to the state `goal` by at most `most` actions.
 
-    The plan maximises the discounted probability of entering the goal state.  It uses the debiased counts, in which a weak prior replaces
-    the imagined outcomes from before the first try.  The model learns nothing.
+    The plan maximises the discounted probability of entering the goal state.  It uses the debiased counts: observed counts and a weak
+    prior, without the imagined outcomes that the model assumes before the first try.  The model does not learn from these actions.
     """
     space = model.space
     beliefs = model.debiased()
@@ -148,13 +149,16 @@ def success(run: Run, budget: int) -> float:
 
 
 def direct(run: Run, budget: int) -> float:
-    """Return the share of tasks that a run solved by the fewest actions that its graph allows, after `budget` transitions."""
+    """Return the share of tasks that a run solved directly, after it had learned for `budget` transitions.
+
+    Directly means: with the smallest number of actions that its graph allows.
+    """
     place = run["budgets"].index(budget)
     return float(np.mean(run["reached"][place] & (run["actions"][place] <= run["fewest"])))
 
 
 def length(run: Run) -> float:
-    """Return the mean number of actions in the tasks that a run solved after its last transition."""
+    """Return the mean number of actions of the solved tasks, in the last test of a run, which follows its last transition."""
     return float(run["actions"][-1][run["reached"][-1]].mean())
 
 
@@ -192,10 +196,11 @@ def _fewer(grouped: Groups) -> dict[int, list[Run]]:
 
 @claim("paper 4.1", "fewer neighbours shorten learning: transitions until every action was tried once", "qualitative")
 def sooner(grouped: Groups) -> Measured:
-    """Judge whether the time until every action was tried is shorter, the fewer neighbours the states have, from 16 downwards.
+    """Judge whether the learning time decreases with the number of neighbours per state, from 16 downwards.
 
-    Returns the learning times by graph as text, and the verdict.  The verdict is None (open) if some run did not try every action, because
-    then only the times of faster runs are known.
+    The learning time is the number of transitions until every action was tried once.  Returns the learning times by graph as text, and the
+    verdict.  The verdict is None (open) if some runs ended before every action was tried, because the learning times of these slow runs are
+    unknown.
     """
     times = {graph: learning_times(runs) for graph, runs in _fewer(grouped).items()}
     middle = {graph: interquartile_mean(found) for graph, found in times.items() if found}
@@ -212,9 +217,11 @@ def sooner(grouped: Groups) -> Measured:
     "an impression",
 )
 def denser(grouped: Groups) -> Measured:
-    """Judge whether plans in one of the graphs with fewer than 16 neighbours succeed as often, and as directly, as with 16.
+    """Judge whether plans in one of the graphs with fewer than 16 neighbours are as good as plans in the graph with 16.
 
-    The intervals are widened for the number of comparisons (Bonferroni).
+    Plans are as good if the share of tasks that are solved, and the share that is solved directly (with the fewest actions that the graph
+    allows), are each at most 0.02 lower.  Returns these shares by graph as text, and the verdict.  The intervals are widened for the number
+    of comparisons (Bonferroni).
     """
     fewer = _fewer(grouped)
     shares, straight = (of_each(fewer, partial(share, budget=JUDGED)) for share in (success, direct))

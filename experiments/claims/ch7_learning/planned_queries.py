@@ -77,7 +77,11 @@ class FrozenModel:
         self.planner = Planner(self._space, self._beliefs, [goal])
 
     def aim(self, q: Array) -> Array | None:
-        """Return the next sample on the plan from the pose `q`, both (4,) rad; as in `experiments.kit.learning.arm_planners.Rival.aim`."""
+        """Return the pose (4,) rad to which the arm moves next from the pose `q` (4,) rad; it is never None.
+
+        It is the sample of the state to which the planned action in the state of `q` leads if it succeeds.  As in
+        `experiments.kit.learning.arm_planners.Rival.aim`.
+        """
         state = self._space.state_of(q)
         sample: Array = self._space.samples[self._space.goal(state, int(self.planner.policy[state]))]
         return sample
@@ -90,10 +94,11 @@ class FrozenModel:
 
 
 def roadmaps(plant: TablePlant, space: Lattice) -> dict[str, Rival]:
-    """Return three planners that use the lattice as a roadmap, by name, verified with the table at its lower height.
+    """Return three planners, by name, that use the lattice as a roadmap.
 
-    "planned once" never plans again.  "repairs" changes the roadmap where a motion failed, only for the present query; "remembers" does
-    this for all later queries too.
+    The roadmap has the states and motions that are free of contacts with the table at its lower height.  "planned once" plans one path for
+    each query.  "repairs" removes a motion that failed from the roadmap, only for the present query, and plans again; "remembers" does this
+    for all later queries too.
     """
     plant.set_top(DOWN)
     belief = Belief(plant.inner.model, np.zeros(len(space.joints)), arm_clauses())
@@ -107,7 +112,8 @@ def roadmaps(plant: TablePlant, space: Lattice) -> dict[str, Rival]:
 class Queries:
     """The queries of a seed: `pairs` of a start state and a goal state of the lattice `space`.
 
-    `blocked` (S,): whether the arm in the sample of a state touches the raised table, fields included.
+    `blocked` (S,): whether the arm touches the raised table when it is in the sample of a state (the pose that stands for this state).  A
+    contact of the fields, larger volumes that cause repulsive forces, is enough.
     """
 
     space: Lattice
@@ -152,7 +158,7 @@ class Queries:
 
 
 def touched_states(plant: TablePlant, space: Lattice, top: float) -> NDArray[np.bool_]:
-    """Return for which states (S,) the arm in their sample has a contact, or is too near to a cable constraint.
+    """Return in which states (S,) the arm has a contact or is too near to a cable constraint, when it is in the sample of the state.
 
     `top`: height of the table's top [m], to which the table is moved before; it stays there.
     """
@@ -183,7 +189,7 @@ def drawn_pairs(plant: TablePlant, space: Lattice, count: int, seed: int) -> lis
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Followed:
-    """How well a planner led the arm through the queries: four measures over all queries, and the paths.
+    """How well a planner led the arm through the queries: `success`, `actions`, `touched` and `met` (see the fields), and the paths.
 
     `paths`: the visited states of each query, from its start to its end.
     """
@@ -235,7 +241,7 @@ def follow(space: Lattice, rival: Rival, pairs: Sequence[tuple[int, int]], tops:
 
 
 def promises(space: Lattice, beliefs: OutcomeModel, pairs: Sequence[tuple[int, int]], paths: Paths) -> tuple[float, float]:
-    """Return how much of the plans was predicted and fulfilled: two numbers from 0 to 1, means over the queries.
+    """Return the predicted and the observed reliability of plans: two numbers from 0 to 1, means over the queries.
 
     The first is the predicted probability that all actions of a plan end as planned.  The second is the share of queries whose states, in
     `paths`, were exactly those of the plan.  `beliefs`: transition model of the plans.  `pairs`: start and goal state of each query.  A

@@ -95,9 +95,10 @@ CLAIMS = (uniform, collected, faster)
 def findings(found: Cells) -> dict[str, Any]:
     """Return the results as a dict with two keys, "runs" and "claims".
 
-    "runs" is a dict with two rows for each explorer, of the mean and of the largest reward: "seeds", and "after_N_transitions", the reward.
-    "claims" is a list with the claims, their measured values and their verdicts, as dicts (`Claim.record`).  If not every explorer was run,
-    all claims stay unmeasured and are not judged.
+    "runs" is a dict with two rows for each explorer: one for the mean and one for the largest reward of all actions.  A row has the number
+    of runs ("seeds"), and this reward [nats] after each measured number of transitions ("after_N_transitions").  "claims" is a list with
+    the claims, their measured values and their verdicts, as dicts (`Claim.record`).  If not every explorer was run, all claims stay
+    unmeasured and are not judged.
     """
     groups = grouped(found, "explorer", EXPLORERS)
     rows: dict[str, Any] = {}

@@ -2,15 +2,16 @@
 """Let three independent agents, of torso and arms, explore near a table that an arm reaches only when the torso bends forward.
 
 Claim: over time the agents bend forward, put the arms low and touch the table more and more often, in cycles.  They try most often the
-actions whose outcomes depend on another part, both arms the same ones; such an action ends in a handful of states.
+actions whose outcomes depend on another part; both arms prefer the same actions.  Such an action ends in a handful of states.
 Source: paper 3.2 and 4.4, figs. 8 to 10; thesis 6.4, 7.4, figs. 7.10 to 7.12; one run of 18 000 transitions a learner in "a little more
 than two full days".  Run time: 9 minutes on 2 cores; with --part more than twice as long.
 
-Torso (27 states, 8 neighbours) and arms (81 states, 16 neighbours, one graph for both) at a table 50 cm thick.  Counts of tries alone say
+Torso (27 states, 8 neighbours) and arms (81 states, 16 neighbours, both the same graph) at a table 50 cm thick.  Counts of tries alone say
 little, because on a graph of 16 neighbours some actions are tried more often than others even without a table, and all runs share one
 graph.  So each explorer also runs with a ghost of the table, which exerts no force, and tries are compared with those at the ghost.  An
 action of an arm touches the table if a field of the arm is within 2 cm of the table, or of the ghost, when it ends.
---part: contact forces act only up to the root of a part, as in the original program, so that the table exerts no force on the torso.
+--part: a contact force acts only on the motors of the part that touches, as in the original program; so a contact of an arm with the table
+exerts no force on the torso.
 """
 
 from __future__ import annotations
@@ -62,15 +63,15 @@ DAYS, TOLERANCE = (2.0, 2.4), 0.1  # of plant time: "a little more than two", an
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the option --part: also run with contact forces that act only up to the root of a part."""
+    """Add the option --part: also run with contact forces that act only on the motors of the part that touches."""
     parser.add_argument("--part", action="store_true", help="also with contact forces that act only up to the root of a part")
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
     """Return the settings of the runs: every explorer at the table and at its ghost, which exerts no force.
 
-    With --part the same runs are made again with contact forces that act only up to the root of a part.  With --quick the runs have 2000
-    instead of 18 000 transitions per part.
+    With --part the same runs are made again with contact forces that act only on the motors of the part that touches.  With --quick the
+    runs have 2000 instead of 18 000 transitions per part.
     """
     transitions, name = (QUICK, "quick-") if arguments.quick else (TRANSITIONS, "")
     return [
@@ -84,13 +85,13 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Let the three agents explore with one explorer, at the table or at its ghost, until each has made its transitions.
+    """Let the three agents explore with one explorer until each has made its transitions, at the table or its ghost (without forces).
 
     Returns for each part `seen_PART` (T, 3), the transitions: state, action, state reached; `settled_PART` (T,), False after a timeout;
     `durations_PART` (T,) [s]; and `ends_PART` (T,) [s], the plant time at the end.  For each arm also `touch_ARM` (T,), whether an action
     ended within 2 cm of the table or ghost, and `forward_ARM` (T,), whether the torso was bent forward then.  `settings`: "explorer";
-    "world", "ghost" for the table's ghost; "propagate", "tree" or "part": on which motors contacts act; "transitions", the number for each
-    agent.  `seed`: of agents and plant.
+    "world", "table" or "ghost"; "propagate", "tree" if a contact force acts on all motors from the link down to the base, "part" if only on
+    those of the link's part; "transitions", the number for each agent.  `seed`: of agents and plant.
     """
     count = settings["transitions"]
     plant = table_plant(seed, settings["world"] == "ghost", settings["propagate"])
@@ -110,11 +111,12 @@ Number = Callable[[Run], float]
 def findings(found: Cells) -> dict[str, Any]:
     """Return the results as a dict of tables, and a list with the judged claims, as dicts (`Claim.record`), under "claims".
 
-    Each table is a dict.  "conditions": a row for each explorer at the table and at its ghost, which exerts no force: "seeds", and means of
-    the numbers in ROW.  "tries at the table over those at the ghost": correlations of these ratios between the arms, and the share of low
-    goals among the largest ratios.  "number of actions by number of outcomes": for each condition the number of actions of a run, by the
-    number of states in which they ended.  "precision of finding actions that depend on other parts": the result of `detector`.  If not
-    every explorer was run in full at both, all claims stay unmeasured and are not judged.
+    Each table is a dict.  "conditions": a row for each explorer at the table and at its ghost, which exerts no force: "seeds", and the
+    means over the runs of the numbers that ROW defines.  "tries at the table over those at the ghost": for each explorer, how this ratio of
+    the left arm's actions correlates with that of the right arm's, and how many of the actions with the largest ratios have a low goal.
+    "number of actions by number of outcomes": for each condition the number of actions of a run, by the number of states in which they
+    ended.  "precision of finding actions that depend on other parts": the result of `detector`.  If not every explorer was run in full at
+    table and ghost, all claims stay unmeasured and are not judged.
     """
     forces = runs_of(found)
     tree = forces.get(PROPAGATIONS[0], {})
@@ -174,11 +176,11 @@ def _histogram(runs: Sequence[Run]) -> dict[str, float]:
 
 
 def detector(runs: Runs) -> dict[str, dict[str, float]]:
-    """Return how well a high number of tries indicates that an action depends on other parts, by "learner, explorer".
+    """Return how well a high number of tries indicates that an action depends on poses of other parts, by "learner, explorer".
 
     A detector names the actions with the highest scores, as many as really depend on other parts, so that its precision and recall are
-    equal.  Each value is a dict: "tries", the precision if the score is the number of tries; "beside_ghost", if it is the number of tries
-    over that at the ghost of the table; "chance", the precision of a random choice.
+    equal.  Each value is a dict: "tries", the precision if the score is the number of tries at the table; "beside_ghost", the precision if
+    the score compares this number with that at the table's ghost (`log_ratios`); "chance", the precision of a random choice.
     """
     table: dict[str, dict[str, float]] = {}
     for learner, explorer in product(LEARNERS, EXPLORERS):
@@ -345,9 +347,9 @@ def plot(found: Cells) -> Any:
     """Draw how the three learners explore at the table and at its ghost, which exerts no force, in a figure of nine panels.
 
     The panels show the tries of the three learners as in paper fig. 10; how often the torso leans forward; contact with the table over
-    time; the agreement of both arms; cycles of contact; the numbers of outcomes of the actions; and how well tries detect actions that
-    depend on other parts.  Returns a matplotlib figure.  Raises InvalidValue if no seed has runs of the curious agents both at the table
-    and at the ghost.
+    time; how similar the preferences of both arms are; cycles of contact; how many different outcomes the actions have; and how well one
+    can find the actions that depend on other parts by their numbers of tries.  Returns a matplotlib figure.  Raises InvalidValue if no seed
+    has runs of the curious agents both at the table and at the ghost.
     """
     runs = runs_of(found).get(PROPAGATIONS[0], {})
     pairs = with_ghosts(runs, "curious")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Measures of runs at the table: contact of the arms with it, interest in it, cycles of contact, and actions that depend on other parts.
+"""Measures of runs at the table: contact of the arms, preferred actions, cycles of contact, and actions that depend on other parts.
 
 A ghost of the table is an object at the same place that exerts no force.  Contact is computed from poses alone, in the same manner for the
 table and its ghost.
@@ -7,11 +7,11 @@ table and its ghost.
 On a graph of 16 neighbours some actions are tried more often than others even without a table, so tries are compared with those of the same
 agent at the ghost.
 
-Contact is cyclic if the autocorrelation of the contact rate at the table has a second peak, at the period, and the one at the ghost has
-none.  High values at the first lags only mean that contacts come in bouts.
+Contact is cyclic if the autocorrelation of the contact rate at the table has a second peak, whose lag is the period of the cycle, and the
+autocorrelation at the ghost has no such peak.  High values at the first lags only mean that contacts occur in groups.
 
-At a ghost no part disturbs another, except for hands that meet.  So an action that ends elsewhere at the table than at the ghost depends on
-the poses of the other parts (paper 4.4).  For each judged run, this is computed from the runs of all other seeds.
+At a ghost no part disturbs another, except that the hands can meet.  So an action that ends elsewhere at the table than at the ghost
+depends on the poses of the other parts (paper 4.4).  For each judged run, these actions are found in the runs of all other seeds.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ def world_around(margin: float) -> World:
 
 
 def near_table(q: Array, arm: str, margin: float = NEAR_DISTANCE) -> NDArray[np.bool_]:
-    """Return in which poses a field of the arm is nearer to the table than `margin` [m], (N,).
+    """Return in which poses a field (volume that causes repulsive forces) of the arm is nearer to the table than `margin` [m], (N,).
 
     `q`: (N, n) rad, poses of the robot.  `arm`: "left_arm" or "right_arm".
     """
@@ -106,10 +106,10 @@ def is_forward(q: Array) -> NDArray[np.bool_]:
 def summary(values: dict[str, Any]) -> dict[str, Any]:
     """Reduce the values of a trial at the table to the numbers and counts from which claims and figure are computed.
 
-    Returns for each part, with its name at the end of the key, `ends_at` and `ends`: the non-zero entries of the counts (S, A, S) of how
-    often an action ended in a state, as flat indices and counts; `late_tries` (S, A), tries in the second half; and `timeouts`, the share
-    of actions that timed out.  For the arms together, `touch_rate`, the contact rate in windows of 50 transitions, and `touch`, `growth`
-    and `low_and_forward` as in `Run`.  `hours`: plant time; `transitions`: of each part.
+    Returns for each part, with its name at the end of the key, how often each action ended in each state: `ends_at`, the flat indices of
+    the non-zero entries of the table (S, A, S), and `ends`, these entries.  Also `late_tries` (S, A), tries in the second half, and
+    `timeouts`, the share of actions that timed out.  For the arms together, `touch_rate`, the contact rate in windows of 50 transitions,
+    and `touch`, `growth` and `low_and_forward` as in `Run`.  `hours`: plant time; `transitions`: of each part.
     """
     seen = {part: values[f"seen_{part}"].astype(np.intp) for part in PARTS}
     touch, forward = (np.array([values[f"{name}_{arm}"] for arm in ARMS], dtype=bool) for name in ("touch", "forward"))
@@ -137,7 +137,7 @@ def summary(values: dict[str, Any]) -> dict[str, Any]:
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """One run of the three agents of torso and arms; `result`: its cell, with the values of `summary`."""
+    """One run of the three agents of torso and arms; `result`: the stored result of the run, with the values of `summary`."""
 
     result: CellResult
 
@@ -251,9 +251,10 @@ Runs = Mapping[tuple[str, str], list[Run]]  # by explorer and world
 
 
 def runs_of(found: Cells) -> dict[str, Runs]:
-    """Return a dict from the propagation of contact forces ("tree" or "part") to a dict from (explorer, world) to the finished runs.
+    """Return the finished runs: a dict from "tree" or "part" to a dict from (explorer, world) to a list of runs.
 
-    Each group is sorted by seed; groups without a finished run are absent.
+    "tree": a contact force acts on all motors from the link down to the base; "part": only on those of the link's part.  Each group is
+    sorted by seed; groups without a finished run are absent.
     """
     grouped = runs_by(found, Run, "propagate", "explorer", "world")
     forces: dict[str, dict[tuple[str, str], list[Run]]] = {}
@@ -328,8 +329,8 @@ def correlations(runs: Sequence[Run]) -> Array:
 def second_peak(curves: Array) -> int:
     """Return the lag, in windows, of the second peak of an autocorrelation; the first peak is the one at the lag 0.
 
-    This is the lag at which the mean of `curves` (runs, lags) is largest, among the lags from 3 windows on.  If the mean is negative
-    somewhere from there on, only lags from the first negative value on are considered, because nearer ones belong to the first peak.
+    This is the lag at which the mean of `curves` (runs, lags) is largest, among the lags from 3 windows on.  If the mean is negative at any
+    of these lags, those before its first negative value are left out, because they belong to the first peak.
     """
     mean = curves.mean(axis=0)
     fallen = np.flatnonzero(mean[BOUT + 1 :] < 0.0)
@@ -338,7 +339,7 @@ def second_peak(curves: Array) -> int:
 
 
 def at_second_peak(ours: Array, theirs: Array) -> tuple[list[float], list[float]]:
-    """Return the autocorrelation of each run, and of its ghost, at the lag that is the second peak of all other runs.
+    """Return the autocorrelation of each run, and of its ghost, at one lag: that of the second peak in the mean of all other runs.
 
     `ours`, `theirs`: autocorrelations (runs, lags) at the table and at its ghost, which exerts no force; at least two runs.
     """
@@ -351,8 +352,8 @@ def is_cyclic(ours: Array, theirs: Array) -> bool | None:
     """Return whether contact is cyclic: whether the autocorrelation has a second peak, above 0 and above that at the ghost.
 
     `ours`, `theirs`: autocorrelations (runs, lags) at the table and at the ghost; at least two runs.  True if the interval of the runs'
-    values at the second peak is above 0 and above that at the ghost.  Otherwise None (undecided) if single runs have larger highest values
-    than at the ghost, at lags from 3 windows on, and False if they have not.
+    values at the second peak is above 0 and above that at the ghost.  Otherwise the largest value of each run at lags from 3 windows on is
+    compared: None (undecided) if the interval of these values is above that at the ghost, else False.
     """
     here, there = at_second_peak(ours, theirs)
     if interval(here)[0] > max(0.0, interval(there)[1]):
@@ -379,12 +380,12 @@ class Judged:
 
     @property
     def chance(self) -> float:
-        """The share of all actions that depend on other parts: the precision of a random choice."""
+        """The precision of a random choice: the number of actions that depend on other parts over the number of all actions."""
         return float(self.hits.mean())
 
     @property
     def at_all(self) -> float:
-        """The precision, which equals the recall, if as many actions are called dependent as really depend on other parts."""
+        """The precision if the first k actions are called dependent, where k actions really depend on other parts; equals the recall."""
         return float(self.hits[:, : int(self.hits[0].sum())].mean())
 
     @property
@@ -419,8 +420,9 @@ def dependent(runs: Runs, parts: Sequence[str], but: int) -> NDArray[np.bool_]:
 def judged_of(runs: Runs, explorer: str, learner: str, score: str) -> list[Judged]:
     """Sort the actions of a learner in each run of an explorer by a score, and mark which depend on other parts.
 
-    `learner`: "torso" or "arms".  `score`: "tries", or "beside_ghost" for tries over those at the ghost.  A run is left out if in the runs
-    of other seeds no action depends on other parts, or if there are no runs of other seeds.
+    `learner`: "torso" or "arms".  `score`: "tries", or "beside_ghost" for tries over those at the ghost.  Which actions depend on other
+    parts is found in the runs of all other seeds (`dependent`).  A run is left out if no such action is found, if there are no other seeds,
+    or if there is no run at the ghost with the same seed.
     """
     found = []
     for run, ghost in with_ghosts(runs, explorer):

@@ -9,12 +9,13 @@ Worlds: RiverSwim with 6 and 20 states, DeepSea of depth 10, four rooms with sli
 five outcomes.  All explorers know the number of states and actions, and nothing of an action before its first try.
 
 Two tasks are measured.  "coverage", without rewards: the number of transitions until every reachable state-action was tried once, and five
-times; and the L1 distance (0 to 2) of the believed outcomes (`debiased`, for all explorers) from the true ones, after 20 transitions for
-each state-action.  "return": the sum of all rewards, over that of the best policy; the explorers must find the rewards by trying.  For
-"return" each explorer has one parameter, with the same value in all worlds: the weight of the rewards relative to the information gain in
-nats ("curious"), the size of the bonus ("count bonus"), the tries after which an action counts as known ("R-MAX"), the steps of an episode
-("PSRL"), or the share of random actions ("epsilon-greedy").  The values were set in advance and not tuned, except for R-MAX: its value is
-10, because with 3 it gave up in RiverSwim in a first run.  `--tune` measures other values, with other seeds.
+times; and the L1 distance (0 to 2) of the believed outcomes from the true ones, after 20 transitions for each state-action.  For all
+explorers these beliefs are those of `TransitionModel.debiased`: the real counts and a weak prior.  "return": the sum of all rewards, over
+that of the best policy; the explorers must find the rewards by trying.  For "return" each explorer has one parameter, with the same value
+in all worlds: the weight of the rewards relative to the information gain in nats ("curious"), the size of the bonus ("count bonus"), the
+tries after which an action counts as known ("R-MAX"), the steps of an episode ("PSRL"), or the share of random actions ("epsilon-greedy").
+The values were set in advance and not tuned, except for R-MAX: its value is 10, because with 3 it gave up in RiverSwim in a first run.
+`--tune` measures other values, with other seeds.
 """
 
 from __future__ import annotations
@@ -104,11 +105,11 @@ def _condition(task: str, world: str, explorer: str, number: float = 0.0, seeds:
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Explore one world, either until every action was tried ("coverage") or for rewards ("return").
 
-    "coverage" returns `pairs`, the number of actions in reachable states; `once` and `often`, the numbers of transitions until all of them
-    were tried once, and five times, or `most`, the limit, if they were not; `finished`, two booleans, whether they were tried once, and
-    five times; and `error`, the L1 error of the beliefs.  "return" returns `best`, the mean reward per action under the best policy;
-    `share`, the mean reward divided by it; and `earned`, the sum of rewards at 100 times.  `settings`: "task"; "world", a key of WORLDS;
-    "explorer"; and for "return" its parameter "number".  `seed`: of agent and world.
+    "coverage" returns `pairs`, the number of actions in reachable states; `once`, the number of transitions until all of them were tried
+    once; `often`, the number until all were tried five times; `most`, the limit, which replaces `once` or `often` if that did not happen;
+    `finished`, two booleans, whether all were tried once, and five times; and `error`, the result of `distance`.  "return" returns `best`,
+    the mean reward per action under the best policy; `share`, the mean reward divided by it; and `earned`, the sum of rewards at 100 times.
+    `settings`: "task"; "world", a key of WORLDS; "explorer"; and for "return" its parameter "number".  `seed`: of agent and world.
     """
     world = WORLDS[settings["world"]](seed)
     plant = RewardedPlant(world, seed)
@@ -196,9 +197,9 @@ def reached_from(plant: TabularPlant) -> Array:
 
 
 def distance(plant: TabularPlant, agent: CuriousAgent, reachable: Array) -> float:
-    """Return the mean L1 distance, 0 to 2, of the agent's debiased beliefs from the true outcomes of the plant.
+    """Return the mean L1 distance, 0 to 2, of the outcome probabilities that the agent believes from the true ones of the plant.
 
-    `reachable`: (S,) bool, the states whose actions are counted.
+    The beliefs are those of `TransitionModel.debiased`.  `reachable`: (S,) bool, the states over whose actions the mean is taken.
     """
     believed = agent.model.debiased()
     difference = _dense(plant) - _dense(believed)
@@ -222,10 +223,11 @@ def groups(found: Cells, task: str) -> dict[tuple[str, str, float], Runs]:
 def findings(found: Cells) -> dict[str, Any]:
     """Return the results as a dict with the keys "runs" and "mean_share_of_the_best_return".
 
-    "runs" is a dict from "task, world, explorer" to a row; each measure in it is a list of the interquartile mean and its interval.  For
-    the task "coverage": "once" and "often", the transitions until every action was tried once and five times, "error", and numbers of runs
-    ("seeds", "finished_once" and "finished_often"); for "return": "share" (the reward as a share of the best policy's reward) and "seeds".
-    "mean_share_of_the_best_return" is a dict from the explorer and the value of its parameter to this share, as a mean over the worlds.
+    "runs" is a dict from "task, world, explorer" to a row; each measure in it is a list of the interquartile mean and its interval.  A row
+    of the task "coverage" has the measures "once", "often" and "error" of `trial`, the number of runs ("seeds"), and the numbers of runs in
+    which every action was tried once ("finished_once") and five times ("finished_often").  A row of "return" has the measure "share", the
+    reward as a share of the best policy's reward, and "seeds".  "mean_share_of_the_best_return" is a dict from the explorer and the value
+    of its parameter to this share, as a mean over the worlds.
     """
     rows: dict[str, Any] = {}
     for (world, explorer, _), runs in groups(found, "coverage").items():

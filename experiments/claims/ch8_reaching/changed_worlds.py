@@ -10,25 +10,26 @@ Run time: 45 minutes on 2 cores.
 The arm, the targets, the control law and the recommended learner are those of the experiment reach-predictors, at a table.  After 200
 problem-tries a ball with a radius of 10 cm appears, the table is raised by 8 cm, or each joint is miscalibrated by 5 degrees; or nothing
 changes.  There are 20 positions of the ball.  They were drawn uniformly in the workspace, at least 12 cm from each target and away from the
-robot at home; the first 20 were taken with which a learner without a detector loses 15 % of its score or more, and an oracle keeps at least
-three quarters of its score.  All seeds are run with each ball.  A result with balls is computed from the 20 means over the seeds, because
-results differ more between balls than between seeds.
+robot at home.  A position was kept if a learner without a detector loses at least 15 % of its score there, while an oracle keeps at least
+three quarters of its own; the first 20 such positions were taken.  All seeds are run with each ball.  A result with balls is computed from
+the 20 means over the seeds, because results differ more between balls than between seeds.
 
-The oracle of the new world plans as the learners do, but it knows one measured reward of a reach from each state for each target, and the
-transitions that failed in at least one of two tries without a target.  It has learned which transitions fail because of a target in three
-tries of each target.  As its rewards are single samples, a learner can exceed its score.  With the ball number 12 the oracle's score is far
-too low (.83, while learners have 4.6): it enters states that the robot entered in no measurement, so that it knows no failures there, and
-cannot leave them.  The interquartile mean leaves this ball out.  The oracle's encoders have the same errors as the learners'.
+The oracle of the new world plans as the learners do, but it knows the world from measurements.  For each state and each target one reach
+was made, and the oracle knows its reward.  Without a target each transition was tried twice, and the oracle avoids those that failed at
+least once.  From three tries of each target it has learned which transitions a target blocks.  As its rewards are single samples, a learner
+can exceed its score.  With the ball number 12 the oracle's score is far too low (.83, while learners have 4.6): it enters states that the
+robot entered in no measurement, so that it knows no failures there, and cannot leave them.  The interquartile mean leaves this ball out.
+The oracle's encoders have the same errors as the learners'.
 
 There are five learners.  The first has no detector of changes; the second assumes a change after every 100 outcomes; the third detects
 changes by a generalised likelihood ratio of two windows, and the fourth by the posterior over run lengths (numbers of outcomes since the
-last change).  The fifth has the same detector as the fourth, and also sees: its hand after each action, with an error of 5 mm along each
-axis (standard deviation), by which its plant corrects the encoders (`mobee.vision.calibration.self_calibration`).  During evaluations it
-does not see the hand, because they measure what it knew before.  It also sees an object that appears or has moved, with an error of 1 cm
-along each axis, and of 5 mm in the radius of a ball.  Then it first makes 300 problem-tries on a simulated robot in the world as it is seen
-(`ReachAgent.practise`); they do not count among the 60.  The simulator is that of the robot itself, so that only the errors of the object
-and the noise differ: this shows what perception is worth, not what a wrong model of the robot costs.  All learners are judged by the true
-place of the hand.
+last change).  The fifth has the same detector as the fourth, and also sees.  It sees its hand after each action, with an error of 5 mm
+along each axis (standard deviation); from these positions its plant corrects the encoders (`mobee.vision.calibration.self_calibration`).
+During evaluations it does not see the hand, because they measure what it knew before.  It also sees an object that appears or has moved,
+with an error of 1 cm along each axis, and of 5 mm in the radius of a ball.  Then it first makes 300 problem-tries on a simulated robot in
+the world as it is seen (`ReachAgent.practise`); they do not count among the 60.  The simulator is that of the robot itself, so that only
+the errors of the object and the noise differ: this shows what perception is worth, not what a wrong model of the robot costs.  All learners
+are judged by the true place of the hand.
 """
 
 from __future__ import annotations
@@ -96,13 +97,13 @@ class FixedRate:
 
 
 class LikelihoodRatio:
-    """A detector by the generalised likelihood ratio of two windows with different shares of contradicting outcomes.
+    """A detector that compares two windows of outcomes with a single window, by the generalised likelihood ratio.
 
     In a window, a constant share of the outcomes contradicts what was learned: these have the probability `unknown`, the others `learned`
-    (the arguments of `add`).  The n outcomes since the last change are divided into two windows at the place where their likelihood is
-    largest.  A change is reported if the logarithm of this likelihood exceeds that of a single window by more than log n - log h: log n is
-    the penalty of the Bayesian information criterion for two further parameters, and h the largest probability of a change per outcome that
-    `RunLength` considers.
+    (the arguments of `add`).  The n outcomes since the last change are divided into two windows with different shares, at the place where
+    their likelihood is largest.  A change is reported if the logarithm of this likelihood exceeds that of a single window by more than log
+    n - log h: log n is the penalty of the Bayesian information criterion for two further parameters, and h is 0.01, the largest value in
+    `HAZARDS` (probabilities that the world changes before an outcome).
     """
 
     def __init__(self) -> None:
@@ -111,8 +112,8 @@ class LikelihoodRatio:
     def add(self, learned: float, unknown: float) -> int | None:
         """Add an outcome; returns the number of outcomes since a change, if one is detected now, else None.
 
-        `learned`: probability or density of the outcome by what was learned; `unknown`: without any knowledge.  A change to fewer
-        contradicting outcomes is not reported.  As in `mobee.learning.reaching.changes.Detector.add`.
+        `learned`: probability or density of the outcome according to what was learned; `unknown`: the same if nothing was learned.  A
+        change to fewer contradicting outcomes is not reported.  As in `mobee.learning.reaching.changes.Detector.add`.
         """
         self._logs.append(np.log((1.0 - SHARES) * learned + SHARES * unknown))
         if len(self._logs) < 2:
@@ -214,12 +215,13 @@ def model_of(seed: int) -> TransitionModel:
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Let every learner learn, change the world, and let the learners learn again; the oracle of the new world is measured, too.
 
-    Returns for the D learners, after each of L numbers of problem-tries (attempts to reach one target) since the change, the means over the
-    evaluations: `score` (D, L), sum of the rewards; `failures` (D, L), failed transitions; `without` (D, L), targets without a reach.
-    `false` (D,): number of changes detected before the world changed.  `detected` (D,): problem-tries from the change until the learner
-    detected a change; 0 if it saw the change at once, inf if it never detected one.  `oracle`: score of the oracle.  `settings`: "change"
-    and "ball", as in `plant_of`; "tries", the number before the change; "checkpoints", the L numbers; "practice", number of tries in a
-    simulation of the changed world.  `seed`: of learners and plants.
+    The D learners are evaluated L times after the change, each time after a given number of problem-tries (attempts to reach one target).
+    Returns as means over the evaluations at one time: `score` (D, L), sum of the rewards; `failures` (D, L), number of failed transitions;
+    `without` (D, L), number of targets for which no reach was made.  `false` (D,): number of changes detected before the world changed.
+    `detected` (D,): problem-tries from the change until the learner detected a change; 0 if it saw the change at once, inf if it never
+    detected one.  `oracle`: score of the oracle.  `settings`: "change" and "ball", as in `plant_of`; "tries", the number before the change;
+    "checkpoints", the L numbers of problem-tries since the change; "practice", number of tries in a simulation of the changed world.
+    `seed`: of learners and plants.
     """
     found = [_learned(*learner, settings, seed) for learner in LEARNERS.values()]
     names = ("score", "failures", "without", "false", "detected")
@@ -315,17 +317,17 @@ def runs_of(found: Cells) -> Runs:
 
 
 def relative(worlds: Worlds) -> Array:
-    """Return the scores in N worlds after L numbers of problem-tries, divided by the score of the world's oracle, (N, L).
+    """Return the scores in N worlds at the L checkpoints after the change, divided by the score of the world's oracle, (N, L).
 
-    They are means over the seeds of a world.  A problem-try is one attempt to reach one target.
+    A checkpoint is a number of problem-tries (attempts to reach one target).  The scores are means over the seeds of a world.
     """
     return np.array([np.mean([run["score"] / run["oracle"] for run in group], axis=0) for group in worlds])
 
 
 def failures(worlds: Worlds) -> Array:
-    """Return the mean number of failed transitions in an evaluation, in N worlds after L numbers of problem-tries, (N, L).
+    """Return the mean number of failed transitions in an evaluation, in N worlds at the L checkpoints after the change, (N, L).
 
-    The mean is over evaluations and seeds.  A problem-try is one attempt to reach one target.
+    A checkpoint is a number of problem-tries (attempts to reach one target).  The mean is over evaluations and seeds.
     """
     return np.array([np.mean([run["failures"] for run in group], axis=0) for group in worlds])
 

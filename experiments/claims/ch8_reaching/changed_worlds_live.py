@@ -1,27 +1,28 @@
 # SPDX-License-Identifier: Apache-2.0
 """Change the world of the live robot after a reach learner has learned in it, and measure how soon the learner is back.
 
-Claim: as of the experiment changed-worlds, on a robot with physics: a learner that detects changes, and sees its hand and the objects, is
-back at .95 of the score of an oracle that knows the new world within 60 problem-tries, with at most 2 failed transitions per evaluation.
+Claim: as in the experiment changed-worlds, but on a robot with physics: a learner that detects changes, and sees its hand and the objects,
+is back at .95 of the score of an oracle that knows the new world within 60 problem-tries, with at most 2 failed transitions per evaluation.
 Source: aim of this reproduction, to thesis 7.2.6, where actions "suddenly brought the robot somewhere else".  Published: no numbers.
 Run time: RUNTIME.
 
 The robot, its table, law, states and targets are those of the experiment live-reach: the iCub in lockstep under the default law, with ticks
-of 20 ms.  A learner (predictor gp, strategy ucb, failures alike, detector run_length) makes 3000 curious transitions and 200 tries of the
-27 targets on the offline plant with the identified motors, then 27 tries on the live robot.  Then the robot is started again in a changed
-world, once for each change.  A ball with a radius of 10 cm has appeared, the first of the 20 balls of changed-worlds; or the table is 8 cm
-higher; or the encoders of four joints of the arm are wrong by 5 degrees each, in the simulator, so that controller and model have wrong
-angles too.
+of 20 ms.  A learner (`ReachAgent` with predictor "gp", strategy "ucb", failures "alike" and detector "run_length") makes 3000 curious
+transitions and 200 tries of the 27 targets on the offline plant with the identified motors, then 27 tries on the live robot.  Then the
+robot is started again in a changed world, once for each change.  A ball with a radius of 10 cm has appeared, the first of the 20 balls of
+changed-worlds; or the table is 8 cm higher; or the encoders of four joints of the arm are wrong by 5 degrees each, in the simulator, so
+that controller and model have wrong angles too.
 
 The learner is evaluated once as it is, without knowledge of the change.  Its eyes and its practice are those of the fifth learner of
 changed-worlds.  It sees its hand with an error of 5 mm, and an object that appeared or moved with errors of 1 cm (5 mm in a ball's radius);
 it then makes 300 tries on the offline plant in the world as it is seen.  That plant is not the robot here, which has physics: its motors
 are only similar, and contacts do not stop it.  Then the learner makes 60 live tries, and is evaluated again.
 
-The oracle knows the reward of one reach from each state for each target, and the transitions that failed in one of two tries without a
-target, measured on the offline plant in the changed world, which is put into each state: on the live robot this would take two hours.
-Failures due to targets it has learned in three live tries of each.  Its rewards are single samples of another plant: a learner can exceed
-its score.  The oracle's encoders are as wrong as the learner's.  All are judged by the simulator's joint positions.
+The oracle knows the reward of one reach from each state for each target, and which transitions failed in at least one of two tries without
+a target.  Both were measured on the offline plant in the changed world, where the arm is put directly into each state; on the live robot
+this would take two hours.  Three live tries of each target have shown the oracle which transitions a target blocks.  Its rewards are single
+samples of another plant: a learner can exceed its score.  The oracle's encoders are as wrong as the learner's.  All are judged by the
+simulator's joint positions.
 """
 
 from __future__ import annotations
@@ -93,7 +94,10 @@ PERFORM = "experiments.claims.ch8_reaching.changed_worlds_live:perform"
 
 
 class TrueHand(Hand):
-    """The live arm, whose reaches are judged by the simulator's true joint positions; it is a `seen_hand.Judge`."""
+    """The live arm, whose reaches are judged by the simulator's true joint positions.
+
+    It is also a `seen_hand.Judge`: it can judge the reaches of a plant that acts through it and corrects its encoders.
+    """
 
     def __init__(self, service: Service, robot: Robot) -> None:
         super().__init__(service, robot)
@@ -148,9 +152,10 @@ class Job(Struct, frozen=True):
 
 
 class Score(Struct, frozen=True):
-    """The results of the evaluations at one time, as means over them.
+    """The results of the evaluations at one time; the first three are means over these evaluations.
 
-    `score`: sum of the rewards.  `failures`: failed transitions.  `without`: targets without a reach.  `detected`: changes detected so far.
+    `score`: sum of the rewards.  `failures`: number of failed transitions.  `without`: number of targets for which no reach was made.
+    `detected`: number of changes detected so far.
     """
 
     score: float
@@ -218,7 +223,10 @@ def _score(agent: ReachAgent, repetitions: int, detected: int) -> Score:
 
 
 def measured_truth(change: str, seed: int) -> Truth:
-    """Measure on the offline plant in the world after a change what its oracle knows; `seed`: of the plant."""
+    """Return what the oracle of a changed world knows, measured on the offline plant in this world.
+
+    `change`: key of CHANGES.  `seed`: of the plant.
+    """
     turns, targets = np.zeros(len(robot().motors)), grid_targets()
     if change == "turn":
         turns[[robot().motor_index(name) for name in TURNS]] = list(TURNS.values())
@@ -291,11 +299,11 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Let a learner learn offline and live, and learn again after each of C changes; or evaluate the oracle of one changed world.
 
-    Returns as means over the evaluations at L times, (C, L): `score`, sum of the rewards; `failures`, failed transitions; `without`,
-    targets without a reach; `detected`, changes detected until then.  The learner is evaluated after the change and after its live tries,
-    the oracle once.  `settings`: "runs", learner or oracle; "changes", keys of CHANGES; "backend"; "tries" and "before", numbers of tries
-    before the change, offline and live; "practice" and "after", numbers of tries after it, in a simulation and live.  `seed`: of learner
-    and robot.
+    The learner is evaluated directly after the change and after its live tries (L = 2), the oracle once (L = 1).  Returns arrays (C, L) of
+    means over the evaluations at one time: `score`, sum of the rewards; `failures`, number of failed transitions; `without`, number of
+    targets for which no reach was made; and `detected`, number of changes detected until then.  `settings`: "runs", "learner" or "oracle";
+    "changes", keys of CHANGES; "backend".  Numbers of tries before the change: "tries", offline; "before", live.  After the change:
+    "practice", in a simulation of the changed world; "after", live.  `seed`: of learner and robot.
     """
     rows: list[list[Score]] = []
     with tempfile.TemporaryDirectory() as scratch:
@@ -334,8 +342,8 @@ Runs = Mapping[str, list[dict[str, Any]]]  # by change
 def runs_of(found: Cells) -> Runs:
     """Return a dict from the change of the world to the results of the learner's runs after it, sorted by seed.
 
-    A result has the arrays that `trial` returns, but for this change alone, (L,), and under "oracle" the score of the agent that knows the
-    changed world.  A change is left out until the run of its oracle has finished.
+    A result has from each array that `trial` returns only the row of this change, (L,); and under "oracle" the score of the agent that
+    knows the changed world.  A change is left out until the run of its oracle has finished.
     """
     learners = [one for one in found.values() if one.cell.settings["runs"] == "learner"]
     others = [one for one in found.values() if one.cell.settings["runs"] == "oracle"]
@@ -356,7 +364,10 @@ def relative(runs: list[dict[str, Any]]) -> Array:
 
 
 def failures(runs: list[dict[str, Any]]) -> Array:
-    """Return the mean number of failed transitions in an evaluation of N runs, at the same two times as `relative`, (N, 2)."""
+    """Return the mean number of failed transitions per evaluation, for N runs, (N, 2).
+
+    The columns are the two times of the evaluations: directly after the change, and after the live tries.
+    """
     return np.array([run["failures"] for run in runs])
 
 
@@ -379,7 +390,7 @@ def _row(runs: list[dict[str, Any]]) -> dict[str, Any]:
         {"runs": len(runs), "oracle's score": runs[0]["oracle"]}
         | {f"score over the oracle's, {at}": estimate(column) for at, column in zip(points, relative(runs).T, strict=True)}
         | {f"failed transitions, {at}": estimate(column, 1) for at, column in zip(points, failures(runs).T, strict=True)}
-        | {"runs with a detection": sum(bool(run["detected"][-1]) for run in runs)}
+        | {"runs with a detection": sum(bool(run["detected"][-1] > run["detected"][0]) for run in runs)}
     )
 
 

@@ -82,7 +82,7 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Train a learner, and let planner, reach and both together attempt the same cases of each scene.
+    """Train a learner, and attempt the same cases of each scene with each method, "planner", "reach" and "both".
 
     Returns arrays (cases,) with keys "scene|method|measure".  The measures are "missing", the distance of the palm from the target's
     surface [m]; "seconds", plant time; and "reward" (thesis eq. 8.4).  `settings`: "law", one of LAWS; "transitions" and "tries", numbers
@@ -149,9 +149,10 @@ CLAIMS = tuple(
 
 
 def plot(found: Cells) -> Any:
-    """Draw the compared measure of each scene and method as bars with intervals, a panel for each law.
+    """Draw a bar with its interval for each scene and method, a panel for each law.
 
-    Returns a matplotlib figure.  Raises InvalidValue if no cell of a law is finished.
+    The bars are mean rewards (thesis eq. 8.4) under the published law, and shares of successes under the default law.  Returns a matplotlib
+    figure.  Raises InvalidValue if a law has no finished run.
     """
     groups = grouped(found, "law", LAWS)
     if len(groups) < len(LAWS):

@@ -137,11 +137,11 @@ def _rivals(settings: dict[str, Any], seed: int, scene: Scene, lattice: Lattice)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """The true world, the errors of the planners' model, and Q queries from rest to the cell of a lattice state.
+    """The true world, the errors of the planners' model, and Q queries.
 
-    `balls`: (B, 3) m, true positions.  `shifts`: (B, 3) m, believed minus true positions.  `turns`: (4,) rad, believed minus true joint
-    angles.  `starts`: (Q, 4) rad, start poses of the arm.  `goals`: (Q,) goal states.  `is_hard`: (Q,), whether the straight motion failed
-    when it was tried.
+    In a query the arm starts at rest, and has to reach the Voronoi cell of a lattice state.  `balls`: (B, 3) m, true positions.  `shifts`:
+    (B, 3) m, believed minus true positions.  `turns`: (4,) rad, believed minus true joint angles.  `starts`: (Q, 4) rad, start poses of the
+    arm.  `goals`: (Q,) goal states.  `is_hard`: (Q,), whether the straight motion failed when it was tried.
     """
 
     balls: Array
@@ -178,8 +178,8 @@ def plant_of(scene: Scene, seed: int, start: Array) -> OfflinePlant:
 def make_scene(seed: int, queries: int) -> Scene:
     """Draw the balls and the errors of a scene, and its queries.
 
-    In half of the queries, or fewer if fewer are found, a straight motion does not reach the goal.  Raises InvalidValue if no queries of
-    one of both kinds are found.  `seed`: of the draw.  `queries`: their number.
+    Half of the queries are hard: a straight motion does not reach the goal.  In the other half it does.  If too few queries of one kind are
+    found, the scene has fewer queries; if none of a kind is found, InvalidValue is raised.  `seed`: of the draw.  `queries`: their number.
     """
     rng = np.random.default_rng([seed, 75])
     balls = _balls(rng)
@@ -266,8 +266,8 @@ class Answers:
 def answer(scene: Scene, rival: Rival, seed: int) -> Answers:
     """Let a planner answer all queries of a scene in their order, and return its results.
 
-    `seed`: with the number of a query, the seed of the plant's noise; so the noise of a query is the same for all planners.  A query ends
-    in the goal's cell, after 120 s of plant time, or when the planner gives up.
+    A query ends in the goal's cell, after 120 s of plant time, or when the planner gives up.  `seed`: it determines, together with the
+    number of a query, the plant's noise in this query, which is the same for all planners.
     """
     lattice = space()
     rows = []
@@ -307,7 +307,7 @@ class Row:
     blocks: list[Array]
 
     def text(self, name: str) -> str:
-        """Return interquartile mean and interval of one of `numbers` as text; `name`: its key, as "success"."""
+        """Return the interquartile mean over the seeds and its 95 % interval as text; `name`: key in `numbers`, as "success"."""
         values = self.numbers[name]
         return estimate(values, 1 if abs(interquartile_mean(values)) >= 2.0 else 2)
 
@@ -341,9 +341,10 @@ def _row(measures: dict[str, list[Array]]) -> Row:
 
 
 def row_of(rows: Rows, rival: str, belief: str) -> Row:
-    """Return the row of a planner, `rival`, with a belief (a kind of errors, as in `believed`, or "").
+    """Return the row of one planner with one belief.
 
-    Raises InvalidValue if the planner has no finished run.
+    `rival`: name of the planner.  `belief`: kind of errors in its model, as in `believed`; "" for a planner without a model.  Raises
+    InvalidValue if this planner has no finished run with this belief.
     """
     if (rival, belief) not in rows:
         raise InvalidValue(f"no finished cell of {rival!r} with belief {belief!r}: continue the run with --resume.")
@@ -407,7 +408,7 @@ CLAIMS = (fails, insufficient)
 
 
 def plot(found: Cells) -> Any:
-    """Draw success and time of all planners for each kind of errors in their model, and the time per query over the queries.
+    """Draw success and time of all planners for each kind of errors in their model, and the time per query after n queries.
 
     Returns a matplotlib figure.
     """

@@ -83,10 +83,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return the settings of the runs: three strategies with every unit of distances (option --scales).
+    """Return the settings of the runs: each of three strategies with each unit of distances in the option --scales.
 
-    The unit is that of the distance in the reward of a reach, thesis eq. 8.4.  With --quick only the first unit is used, and there are 400
-    problem-tries (attempts to reach one target).
+    The reward of a reach (thesis eq. 8.4) depends on the remaining distance in this unit.  With --quick only the first unit is used, and
+    there are 400 problem-tries (attempts to reach one target).
     """
     shared = {"law": arguments.law, "checkpoints": list(CHECKPOINTS[:3] if arguments.quick else CHECKPOINTS)}
     first, *others = arguments.scales[:1] if arguments.quick else arguments.scales
@@ -119,7 +119,8 @@ def summary(values: dict[str, Any]) -> dict[str, Any]:
     """Reduce the values of `trial` to those from which the claims and the figure are computed.
 
     Rewards of an evaluation are added up over the targets, (L, R, 1), for L evaluations of R repetitions.  Problem-tries between two
-    checkpoints are sorted, as only their numbers count.  Durations become the total `hours`, actions their mean.
+    checkpoints are sorted by target and state, because later only their counts are used.  Durations become the total `hours`, actions their
+    mean.
     """
     state, problem = values["reach_state"].astype(np.int8), values["problem"].astype(np.uint8)
     between = np.searchsorted(CHECKPOINTS, np.arange(len(state)), side="right")
@@ -138,8 +139,9 @@ def summary(values: dict[str, Any]) -> dict[str, Any]:
 def findings(found: Cells) -> dict[str, Any]:
     """Return the results: "runs" is a dict from "strategy, unit" to a row, "claims" a list with the judged claims, as dicts.
 
-    The values of a row are numbers or text, or dicts from a number of problem-tries (attempts to reach one target) to text, such as
-    "scores".  Claims about problem-tries that were not made stay open; without a unit with all strategies there are no claims.
+    A key of "runs" names a strategy and a unit of distances, as "greedy, 1 cm".  The values of a row are numbers or text, or dicts from a
+    number of problem-tries (attempts to reach one target) to text, such as "scores".  Only units with runs of all strategies are judged;
+    without such a unit there are no "claims".  If these runs have fewer than 6400 problem-tries, all claims stay open.
     """
     units = runs_of(found)
     results: dict[str, Any] = {"runs": {f"{name}, {unit}": _row(group) for unit, runs in units.items() for name, group in runs.items()}}
@@ -324,9 +326,9 @@ CLAIMS = (
 def plot(found: Cells) -> Any:
     """Draw the runs with the smallest unit of distances (option --scales), and return the matplotlib figure.
 
-    Above: scores, robot time and negative rewards of each strategy.  Middle, one row for each strategy: how often the agent reached from
-    each state in the evaluations, and how often it reached for each target from each state in its tries.  Below: pictures of the robot in
-    the four states from which the first strategy, intrinsic motivation, reached most often in the last evaluation.
+    Above: scores, robot time and negative rewards of each strategy.  Middle, one row for each strategy: three panels with the share of
+    reaches that started in each state in an evaluation, and two panels with the number of reaches by state and target in the tries.  Below:
+    pictures of the robot in the four states from which the first strategy, intrinsic motivation, reached most often in the last evaluation.
     """
     runs = next(iter(runs_of(found).values()))
     drawing = new_figure(15.0, 5.0 + 2.6 * len(runs) + 3.9)

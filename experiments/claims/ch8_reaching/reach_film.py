@@ -106,9 +106,9 @@ def episodes(agent: ReachAgent, plant: OfflinePlant, count: int, seed: int) -> l
 def selected(paths: Sequence[Array]) -> dict[str, int]:
     """Return a dict from the kind of path to the index of its clearest example among paths (T, 3) m of the hand.
 
-    The kinds are "From above", "Far" and "Around the target".  Their clearest examples have, in this order, the steepest descent at the
-    end, the largest distance between start and end, and the largest detour.  No path is chosen for two kinds, and none shorter than 15 cm,
-    so that kinds may be absent.
+    "From above": the path with the steepest descent at its end.  "Far": with the largest distance between start and end.  "Around the
+    target": with the largest detour.  Each path is chosen for at most one kind, and paths shorter than 15 cm are not chosen.  A kind for
+    which no path remains is absent.
     """
     left = [number for number, path in enumerate(paths) if _length(path) >= MIN_LENGTH]
     chosen: dict[str, int] = {}
@@ -163,8 +163,8 @@ def _caption(marker: str, motion: Motion, moment: int) -> str:
 def film(file: Path, out: Path, seed: int, poses: int, height: int) -> list[str]:
     """Draw filmstrips of selected reaches of the learner that is recorded in `file`, and return their titles.
 
-    `seed`: of the tries that are filmed.  `out`: path of the picture.  `poses`: pictures per reach.  `height`: of each, pixels.  Raises
-    MobeeError if no reach is clear enough.
+    `out`: path of the picture.  `seed`: of the plant and of the random targets, of which some are filmed.  `poses`: pictures per reach.
+    `height`: of each, pixels.  Raises MobeeError if no reach has succeeded with a path of the hand of at least 15 cm.
     """
     with ReachStore(file, PART, read_only=True) as store:
         joints = store.settings()["space"]["joints"]

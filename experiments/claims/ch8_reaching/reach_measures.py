@@ -52,8 +52,8 @@ class Runs:
     def agreement(self, checkpoint: int) -> Array:
         """Return how well the choices of states of each run agree with those of the other runs, (N,), from 0 to 1.
 
-        This is the mean overlap of their shares in `chosen`.  `checkpoint`: number of problem-tries (attempts to reach one target) before
-        the evaluation, one of `checkpoints`.
+        Two runs agree by the sum, over the states, of the smaller one of their shares in `chosen`; a run's result is the mean over the
+        other runs.  `checkpoint`: number of problem-tries (attempts to reach one target) before the evaluation, one of `checkpoints`.
         """
         chosen = self.chosen(checkpoint)
         overlaps = np.minimum(chosen[:, None], chosen[None]).sum(axis=-1)
@@ -62,7 +62,7 @@ class Runs:
         return shared
 
     def states_of_half(self, checkpoint: int) -> Array:
-        """Return the smallest number of states from which at least half of a run's reaches started in the evaluations, (N,).
+        """Return how many of the most frequent start states cover at least half of a run's reaches in the evaluations, (N,).
 
         `checkpoint`: number of problem-tries (attempts to reach one target) before the evaluation, one of `checkpoints`.
         """
@@ -70,9 +70,10 @@ class Runs:
         return np.array([np.searchsorted(np.cumsum(one), 0.5) + 1.0 for one in ordered])
 
     def height(self, checkpoint: int) -> Array:
-        """Return the mean height of the palm in the states in which the reaches of a run started, minus that in all states, (N,) m.
+        """Return how much higher the palm is in the states in which a run's reaches started than in all states, (N,) m.
 
-        `checkpoint`: number of problem-tries (attempts to reach one target) before the evaluation, one of `checkpoints`.
+        Both heights are means.  `checkpoint`: number of problem-tries (attempts to reach one target) before the evaluation, one of
+        `checkpoints`.
         """
         heights = hands_of(reach_space(), MARKER)[:, 2]
         above: Array = self.chosen(checkpoint) @ heights - heights.mean()

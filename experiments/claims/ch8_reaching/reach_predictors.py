@@ -57,7 +57,7 @@ Fractions = dict[tuple[str, str], Array]  # learner and set -> (seeds, checkpoin
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options of a sweep, and --law, --scale and --only."""
+    """Add the options of a sweep, and --law (control law), --scale (unit of distances, m) and --only (which learners run)."""
     sweep_arguments(parser)
     parser.add_argument("--law", choices=list(laws()), default="published", help="the control law of the arm (default: published)")
     parser.add_argument(
@@ -69,7 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def places(quick: bool) -> dict[str, Array]:
     """Return a dict from the set of targets ("grid": tried, "between": never tried) to their positions, (targets, 3) m, root frame.
 
-    With `quick` there are nine and one instead of 27 and eight.
+    With `quick`, "grid" has 9 positions instead of 27, and "between" has 1 instead of 8.
     """
     return {GRID: grid()[::3] if quick else grid(), BETWEEN: between()[:1] if quick else between()}
 
@@ -86,9 +86,10 @@ def truths(arguments: argparse.Namespace) -> list[Cell]:
 
 
 def cells(arguments: argparse.Namespace) -> list[Cell]:
-    """Return the cells (runs) of every learner and of the oracle, an agent that knows all true rewards, with every seed.
+    """Return the cells: for each seed, one run of each learner and one of the oracle.
 
-    With --quick there are 200 problem-tries (attempts to reach one target) instead of 1600.
+    The oracle is an agent that knows the true rewards.  With --quick there are 200 problem-tries (attempts to reach one target) instead of
+    1600.
     """
     settings: dict[str, Any] = {"law": arguments.law, "scale": arguments.scale, "quick": arguments.quick}
     seeds = range(arguments.seed, arguments.seed + arguments.seeds)
@@ -102,10 +103,11 @@ def cells(arguments: argparse.Namespace) -> list[Cell]:
 
 
 def measure_truth(cell: Cell) -> dict[str, Any]:
-    """Measure the remaining errors of reaches from all states for the target of a cell, and which transitions this target blocks.
+    """Measure for one target the remaining errors of reaches from all states, and which transitions the target blocks.
 
-    Returns `missing` (S, n) m, remaining errors of n tries to reach from each state, NaN for tries that were not made; and `made` and
-    `failed` (S, A), the number of tries of each transition, and of those that did not end in its goal.
+    `cell`: its setting "place" is the position of the target, (3,) m, root frame.  Returns `missing` (S, n) m, remaining errors of n tries
+    to reach from each state, NaN for tries that were not made; and `made` and `failed` (S, A), the number of tries of each transition, and
+    of those that did not end in its goal.
     """
     settings = cell.settings
     return measure(np.array(settings["place"]), settings["law"], settings["tries"]).values()
@@ -154,7 +156,7 @@ def summary(values: dict[str, Any]) -> dict[str, Any]:
 
 
 def results(folder: Path) -> dict[str, Any]:
-    """Compute the results from the finished cells (each with its settings and seed) in the folder of a run, as `findings` returns them."""
+    """Compute the results, as `findings` returns them, from all cells (each with one setting and seed) that are finished in a folder."""
     return findings(load_cells(folder))
 
 
@@ -258,10 +260,10 @@ CLAIMS = (*aimed, improves)
 
 
 def plot(found: Found) -> Any:
-    """Draw the learners' fractions of the oracle's score over the problem-tries, for both sets of targets; crosses are our aims.
+    """Draw the score of each learner, divided by the oracle's, over the number of problem-tries, a panel for each set of targets.
 
-    Returns a matplotlib figure.  Raises InvalidValue if no learner or no oracle has finished.  A problem-try is one attempt to reach one
-    target.
+    The oracle is an agent that knows the true rewards.  A problem-try is one attempt to reach one target.  Crosses mark the values that we
+    aim at.  Returns a matplotlib figure.  Raises InvalidValue if no learner or no oracle has finished.
     """
     curves, at = fractions(found), evaluated_after(found)
     if not curves:

@@ -112,8 +112,8 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
     Returns `rows`, a list with a dict for each evaluation: `fates`, `seconds` and `actions` as in `Score`, and `hours`, the plant time so
     far [h]; and `targets`, their number.  For a planner also `planning`, the processor time of each try [s], and `remembered`, the number
-    of poses in its memory.  `settings`: "contestant": "learner", or the planner's kind of memory; "wrong", one of WRONG; "tries", the
-    numbers.  `seed`: of scene and contestant.
+    of poses in its memory.  `settings`: "contestant": "learner", or the memory of the planner, "none", "blocked" or "missed"; "wrong", one
+    of WRONG; "tries", the numbers of tries before the evaluations.  `seed`: of scene and contestant.
     """
     contestant = settings["contestant"]
     scene = make_scene(seed, settings["wrong"])
@@ -134,8 +134,9 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 class Scene:
     """The task that all contestants of one seed get.
 
-    `targets`: as MoBeE sees them.  `ball`: position of the hidden ball, (3,) m, root frame.  `turns`: errors of the joints, (4,) rad.
-    `shift`: error of the target positions, (3,) m.  `wrong`: whose model has these errors, "nothing", "planners" or "everyone".
+    `targets`: at the positions that MoBeE believes.  `ball`: position of the ball that blocks motions, (3,) m, root frame.  `turns`: errors
+    of the joint angles, (4,) rad.  `shift`: error of the target positions, (3,) m.  `wrong`: whose model has these errors: "nothing" (no
+    model), "planners" or "everyone" (the planners and MoBeE).
     """
 
     targets: list[ReachTarget]
@@ -149,7 +150,7 @@ class Scene:
 
         If `wrong` is "everyone", encoders and target positions have the errors of the scene, and the control uses them as they are;
         otherwise they have no such errors.  `seed`: of the plant's random numbers.  `ball`: whether the ball that blocks motions is in the
-        world; no outcome names it as touched.
+        world; outcomes do not report contacts with it.
         """
         turns = np.zeros(len(body().motors))
         turns[[body().motor_index(name) for name in RIGHT]] = self.turns
@@ -159,22 +160,22 @@ class Scene:
     def belief(self) -> PeerBelief:
         """Return the planners' model of arm and workspace.
 
-        Unless `wrong` is "nothing", it lacks the ball and the cable constraints.  If `wrong` is "planners", its joints have the errors
-        `turns`.
+        Unless `wrong` is "nothing", it lacks the ball and the cable constraints.  If `wrong` is "planners", its joint angles are wrong by
+        `turns`, too; if it is "everyone", the encoders of `plant` have these errors instead.
         """
         if self.wrong == "nothing":
             return arm_belief(_world(self.ball))
         return arm_belief(cables=False, turns=self.turns if self.wrong == "planners" else None)
 
     def seen(self, target: ReachTarget) -> ReachTarget:
-        """Return a target at the position that the planners believe, which has an error if only the planners' model is wrong."""
+        """Return a target at the position that the planners believe: wrong by `shift` if `wrong` is "planners", else as MoBeE sees it."""
         return replace(target, position=target.position + self.shift) if self.wrong == "planners" else target
 
 
 def make_scene(seed: int, wrong: str) -> Scene:
-    """Draw a ball that blocks motions, and errors of joints (3 degrees) and targets (1 cm).
+    """Draw a ball that blocks motions, and errors of joint angles (3 degrees) and target positions (1 cm).
 
-    They are the same for every `wrong`, which says whose model has the errors: "nothing", "planners" or "everyone".  Targets that cannot be
+    `wrong`: whose model has the errors: "nothing", "planners" or "everyone".  Ball and errors do not depend on it.  Targets that cannot be
     touched because of the ball are left out.  `seed`: of the draw.
     """
     return replace(_drawn(seed), wrong=wrong)
@@ -237,7 +238,7 @@ class Score:
 
 
 class Contestant(Protocol):
-    """The interface of the learner and the planners: they make tries, and may learn from them."""
+    """The interface of the learner and the planners: they try to reach targets, and may learn from these tries."""
 
     def learn(self, tries: int) -> None:
         """Make `tries` more tries, each for the target with the fewest tries so far (thesis 8.3.2), and learn from them."""
@@ -251,7 +252,7 @@ class Contestant(Protocol):
 
 
 class Learner:
-    """The reach learner; before the first try it learns the transitions in the same workspace, but without the hidden ball."""
+    """The reach learner; before the first try it learns the outcomes of transitions on a plant without the ball that blocks motions."""
 
     def __init__(self, scene: Scene, seed: int) -> None:
         alone = scene.plant(seed + 500, ball=False)
@@ -281,9 +282,9 @@ class Learner:
 
 
 class Planner:
-    """A planner (inverse kinematics and RRT-Connect) that plans with its model, and remembers earlier tries.
+    """A planner (inverse kinematics and RRT-Connect) that plans with its model, and may have a memory of earlier tries.
 
-    `memory`: what it remembers: "none", "blocked" motions, or also poses that "missed" the target.
+    `memory`: what it remembers.  "none": nothing.  "blocked": where motions were blocked.  "missed": also which poses missed the target.
     """
 
     def __init__(self, scene: Scene, memory: Memory, seed: int) -> None:
@@ -295,7 +296,7 @@ class Planner:
         """Processor time of each try so far, s."""
 
     def learn(self, tries: int) -> None:
-        """Make `tries` more tries, and remember them; as in `Contestant.learn`."""
+        """Try to reach targets `tries` more times, and keep what `memory` names; as in `Contestant.learn`."""
         for _ in range(tries):
             rng = np.random.default_rng([self._seed, 861, self._tries])
             target = self._problems.least_tried(self._scene.targets, rng)
@@ -341,8 +342,9 @@ def findings(done: Cells) -> dict[str, Any]:
     """Return the results, as lists.
 
     Keys: "claims", a list with the judged claims, as dicts (`Claim.record`); "success", a row for each contestant and kind of error, with
-    shares of success after numbers of tries, ends of the tries, and times; "crossover", a row for each planner and kind of error: the
-    number of tries from which the learner is no worse than the planner, for each seed, as text.
+    the share of success after each number of tries, and, of the last evaluation, the shares of all other ends in FATES, times and actions;
+    "crossover", a row for each planner and kind of error: the number of tries from which the learner is no worse than the planner, for
+    each seed, as text.
     """
     rows, crossings = [], []
     for wrong in WRONG:
@@ -373,10 +375,10 @@ def _row(done: Cells, contestant: str, wrong: str) -> dict[str, Any]:
 
 
 def verdict(leads: Mapping[str, Array], least: float) -> bool | None:
-    """Return whether the learner's lead in success over each planner is at least `least`, by the intervals.
+    """Return whether the learner's lead in success over each planner is at least `least`.
 
-    `leads`: dict from a planner to the learner's share of successes minus that of the planner, (seeds,).  False if the lead over some
-    planner is below `least`, None if the intervals leave this open.
+    `leads`: dict from a planner to the learner's share of successes minus that of the planner, (seeds,).  The intervals over the seeds
+    decide: True if they all lie above `least`, False if one lies completely below it, else None.
     """
     return all_hold(decides(interval(lead), least=least) for lead in leads.values())
 
@@ -394,8 +396,8 @@ def success(done: Cells, contestant: str, wrong: str) -> tuple[list[int], Array]
 def crossover(tries: list[int], learner: Array, peer: Array) -> Array:
     """Return, for each seed, the number of tries from which the learner's success is never again below the planner's, (seeds,).
 
-    `tries`: numbers of tries at the points.  `learner`, `peer`: shares of successes of learner and planner, (seeds, points).  inf if the
-    learner's last share is below the planner's.
+    `tries`: numbers of tries after which both were evaluated.  `learner`, `peer`: shares of successes of learner and planner in these
+    evaluations, (seeds, evaluations).  inf if the learner's last share is below the planner's.
     """
     ahead = learner >= peer
     for_good = np.flip(np.cumprod(np.flip(ahead, 1), axis=1), 1).astype(bool)
@@ -460,7 +462,8 @@ def _of(done: Cells, contestant: str, wrong: str) -> list[CellResult]:
 def plot(done: Cells) -> Any:
     """Draw the share of successes over the tries, a panel for each kind of error.
 
-    Stars mark from where on the learner is no worse than a planner.  Returns a matplotlib figure.
+    A star on the learner's curve, in the colour of a planner, marks the median number of tries of `crossover`, if it is one of the numbers
+    after which there was an evaluation.  Returns a matplotlib figure.
     """
     drawing = new_figure(15.0, 4.6)
     for axes, wrong in zip(drawing.subplots(1, len(WRONG), sharey=True), WRONG, strict=True):

@@ -92,9 +92,9 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
     For the cases, returns arrays (cases,) with keys "scene|contestant|measure"; the measures are "success", "missing" [m], "seconds" (plant
     time) and "thinking" (processor time for plans, s).  For both arms, returns arrays (queries,): "found", "seconds", "smoothing",
-    "corners" and "missing", as in `PlannedQuery`.  `settings`: "scene", "two arms" for paths of both arms, or "cases"; for both arms the
-    number of "queries"; for the cases the numbers of "cases", and of "transitions" and "tries" of the training.  `seed`: of learner, cases
-    and planner.
+    "corners" and "missing", as in `PlannedQuery`.  `settings`: "scene", which is "cases" or "two arms".  With "cases" also "cases", their
+    number, and "transitions" and "tries", numbers of the learner's training; with "two arms" also "queries", their number.  `seed`: of
+    learner, cases and planner.
     """
     if settings["scene"] == "two arms":
         queries = [plan_both_arms(1000 * seed + number) for number in range(settings["queries"])]
@@ -235,8 +235,8 @@ def findings(found: Cells) -> dict[str, Any]:
     """Return the results of the sweep.
 
     Keys: "claims", a list with the judged claims, as dicts (`Claim.record`); "cases", a list with a row for each scene and contestant, as
-    text: success, robot time [s], and planning per try [ms]; "both arms", a dict from each measure in ARM_MEASURES except the first to its
-    estimate as text, or None if it was not measured; and "distance that counts as success [m]".
+    text: success, robot time [s], and planning per try [ms]; "both arms", a dict from "seconds", "smoothing", "corners" and "missing" (see
+    `PlannedQuery`) to mean and interval as text, or None if it was not measured; and "distance that counts as success [m]".
     """
     cases, arms = _of(found, "cases"), _of(found, "two arms")
     rows = [
@@ -266,7 +266,8 @@ def _of(found: Cells, kind: str) -> Runs:
 def of_cases(cases: Runs, scene: str, contestant: str, measure: str) -> Array:
     """Return the mean of a measure of `trial` over the cases, for each seed, (seeds,).
 
-    `cases`: the results of `trial` for each seed.  `scene`, `contestant`, `measure`: the three words of a key of the results.
+    `cases`: the results of `trial` for each seed.  `scene`, `contestant`, `measure`: the mean is over the values under the key
+    "scene|contestant|measure".
     """
     return np.array([values[f"{scene}|{contestant}|{measure}"].mean() for values in cases])
 

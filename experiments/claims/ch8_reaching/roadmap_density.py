@@ -72,13 +72,13 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Put a cup beside the path of each query, and move around it after bumps, with both modes of removing edges.
+    """Put a cup beside the path of each query, and plan around it after bumps, once with each mode of removing edges.
 
     Returns the numbers of `vertices` and `edges` of the roadmap; `invalid` (queries,), the number of edges that the cup blocks; and arrays
     (queries,) with keys "mode|measure".  The modes are "edge" and "around", as in `walked`; the measures "arrived", "bumps", "edges" and
-    "seconds", as in `Walk`.  The path around the cup is executed in the first query: `off` is the palm's error at its end, `solid` the
-    depth of the deepest contact of solids, both in m; NaN if there is no such path.  `settings`: "spacing", distance of the roadmap's
-    vertices; "queries", their number.  `seed`: of the queries.
+    "seconds", as in `Walk`.  The plant executes the path around the cup in the first query: `off` is the distance of the palm from its
+    planned position at the end, `solid` the depth of the deepest contact of solids, both in m; NaN if there is no such path.  `settings`:
+    "spacing", distance of the roadmap's vertices [m]; "queries", their number.  `seed`: of the queries.
     """
     roadmap = built(settings["spacing"])
     found: dict[str, Any] = {"vertices": len(roadmap.q), "edges": len(roadmap.edges)}
@@ -154,7 +154,8 @@ def walked(roadmap: Roadmap, query: Query, mode: str) -> Walk:
     """Follow the shortest path of the remaining edges; after a bump move back to the beginning of the edge, and plan again.
 
     `mode` "edge": a bump removes its edge (thesis 4.2).  "around": it also removes all edges with an end within 3 cm of the end of that
-    edge, except edges that were passed; if no path remains, only the edges on which there was a bump stay removed.
+    edge, but not those that the robot has already followed without a bump.  If this leaves no path, the path may use all edges without a
+    bump.
     """
     removed: set[Edge] = set()
     bumped: set[Edge] = set()
@@ -270,7 +271,7 @@ def comes_past(groups: Groups) -> Measured:
     "a very long time",
 )
 def grows(groups: Groups) -> Measured:
-    """Judge whether the densest roadmap needs more bumps than the sparsest one."""
+    """Return the numbers of bumps as text, and whether the densest roadmap needs more bumps than the sparsest one."""
     bumps = {runs[0]["vertices"]: numbers(runs, "edge", "bumps") for runs in groups.values()}
     sparsest, *_, densest = bumps.values()
     return f"bumps per query, by number of vertices: {texts(bumps, 1, '{}: {}')}", is_above(densest, sparsest)

@@ -6,11 +6,11 @@ workspace object decides whether the failure is a negative reward of the problem
 Source: thesis 9.4.1 (future work).  Published: no numbers.  Run time: five minutes on 2 cores.
 
 The right arm under the published law and the 27 targets are those of reach-exploration; the learner is one of reach-predictors (--learner).
-There are five variants.  All have the same total number of actions; reaches count, evaluations do not.  "contact": transitions and reaches
-are learned at the same time, and failures are attributed by contact.  "first-3000", "first-1000": first 3000 or 1000 curious transitions
-without targets, as in the thesis, and then reaches, during which the model does not change.  "model": at the same time, but every
-transition updates the model, as if there were no contact sensors.  "target": at the same time, but every transition that does not end in
-its goal is attributed to the target, so that only successes update the model.
+There are five variants.  All have the same total number of actions, which includes reaches but not the actions of evaluations.
+"contact": transitions and reaches are learned at the same time, and failures are attributed by contact.  "first-3000": first 3000 curious
+transitions without targets, as in the thesis; then reaches, during which the model does not change.  "first-1000": the same with 1000
+transitions.  "model": at the same time, but every transition updates the model, as if there were no contact sensors.  "target": at the same
+time, but every transition that does not end in its goal is attributed to the target, so that only successes update the model.
 A score is the sum of the rewards of the 27 targets in one evaluation.  The error of a model is the mean L1 distance, 0 to 2, between its
 outcome probabilities (without the imagined outcomes of the prior) and the outcomes of random walks without targets.
 """
@@ -78,7 +78,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return the settings of the runs: the walks that measure the true outcomes, and the five variants of learning.
+    """Return the settings of the runs: walks through the states, which measure the true outcomes of actions, and five variants.
 
     Transitions and reaches are learned at the same time, and failures are attributed by contact, always to the model, or always to the
     target; or 3000 or 1000 transitions are learned first.  With --quick the runs have 2000 instead of 4000 actions.
@@ -89,12 +89,12 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Make a walk that tries every transition, or learn with one variant, with an evaluation after given numbers of actions.
+    """Make a walk that tries every transition, or let one variant learn and evaluate it L times.
 
-    A walk returns its transitions `seen` (T, 3).  A learner returns, for L evaluations of R repetitions, `scores` (L, R), NaN before the
-    first target; `tries` and `failed` (L,), the problem-tries (attempts to reach one target) and the failed transitions so far; and for
-    each evaluation n its transition model, `outcomes_n` and `probabilities_n` (S, A, B).  `settings`: "variant", "walk" or one of VARIANTS;
-    "learner", one of LEARNERS; "checkpoints", the L numbers of actions.  `seed`: of agent and plant.
+    A walk returns its transitions `seen` (T, 3).  A learner returns, for L evaluations that try each target R times, `scores` (L, R), NaN
+    before the first target; `tries` and `failed` (L,), numbers of problem-tries (attempts to reach one target) and failed transitions so
+    far; and for each evaluation n its transition model, `outcomes_n` and `probabilities_n` (S, A, B).  `settings`: "variant", "walk" or one
+    of VARIANTS; "learner", one of LEARNERS; "checkpoints", the L numbers of actions before the evaluations.  `seed`: of agent and plant.
     """
     if settings["variant"] == WALK:
         return {"seen": walk(reach_space(), reach_plant, TRIES, MAX_WALK, seed).astype(np.uint16)}
@@ -141,9 +141,10 @@ class BlamingPlant(WrappedPlant[ReachPlant]):
         self._space, self._blame = space, blame
 
     def act(self, part: str, target: Array) -> Outcome:
-        """Perform an action as `mobee.plant.Plant.act` does; the outcome reports the false contacts that `blame` names.
+        """Perform an action as `mobee.plant.Plant.act` does, but replace the contacts in the outcome.
 
-        `part`, `target`: as in that method.
+        `touched` names the target if `blame` is "target" and the action did not end in its goal; otherwise it is empty.  `part`, `target`:
+        as in that method.
         """
         outcome = super().act(part, target)
         arrived = self._space.state_of(outcome.q) == self._space.state_of(target)
@@ -152,11 +153,11 @@ class BlamingPlant(WrappedPlant[ReachPlant]):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Runs:
-    """The N runs of one variant, each evaluated after the L numbers of `actions` (L,).
+    """The N runs of one variant, each with L evaluations.
 
-    `scores`, `errors`: (N, L), score and mean L1 error of the transition model; NaN where there was no evaluation.  `observed`: (N, L), the
-    mean error only over the transitions that the model has observed.  `tries`, `failed`: (N,), problem-tries (attempts to reach one target)
-    and failed transitions at the end.
+    `actions`: (L,), number of actions before each evaluation.  `scores`, `errors`: (N, L), score and mean L1 error of the transition model;
+    NaN where there was no evaluation.  `observed`: (N, L), the mean error only over the transitions that the model has observed.  `tries`,
+    `failed`: (N,), numbers of problem-tries (attempts to reach one target) and of failed transitions at the end.
     """
 
     actions: Ints
@@ -192,7 +193,10 @@ def are_complete(runs: Mapping[str, Runs]) -> bool:
 
 
 def runs_of(found: Cells) -> dict[str, Runs]:
-    """Return a dict from each variant to its runs, sorted by seed; the errors are NaN if no walk is finished."""
+    """Return a dict from each variant to its runs, sorted by seed.
+
+    The model errors of the runs are NaN if no walk is finished, because the walks measure the true outcomes.
+    """
     walks = [values["seen"] for values in grouped(found, "variant", [WALK]).get(WALK, [])]
     truth = truth_of(reach_space(), np.concatenate(walks).astype(np.intp)) if walks else None
     checkpoints_of = {one.cell.settings["variant"]: one.cell.settings.get("checkpoints", []) for one in found.values()}
@@ -239,8 +243,8 @@ def actions_to(least: float, actions: Ints, scores: Array) -> Array:
 def no_more(ours: Array, theirs: Array) -> bool | None:
     """Return whether the runs of "contact" need at most as many actions as the runs of another variant with the same seeds.
 
-    `ours`, `theirs`: numbers of actions of these two groups of runs, (N,).  None if the interval of the differences leaves this open, or if
-    a run never reached the score, so that its number is inf.
+    `ours`, `theirs`: numbers of actions until a given score is reached (`actions_to`), for these two groups of runs, (N,).  None if a
+    number is inf, because its run never reached the score, or if the interval of the differences contains 0.
     """
     if not np.isfinite([ours, theirs]).all():
         return None
@@ -248,10 +252,10 @@ def no_more(ours: Array, theirs: Array) -> bool | None:
 
 
 def level(ours: Array, theirs: Sequence[Array]) -> bool | None:
-    """Return whether the scores of "contact" are at most 5 % below those of all other variants, by the intervals of the differences.
+    """Return whether the scores of "contact" are at most 5 % below the scores of each other variant.
 
-    `ours`: scores (N,) of "contact" with N seeds.  `theirs`: scores (N,) with the same seeds, for each other variant.  False if ours are
-    farther below one of these, None if the intervals leave this open.
+    `ours`: scores (N,) of "contact" with N seeds.  `theirs`: scores (N,) with the same seeds, for each other variant.  The intervals of the
+    differences decide: True if all lie above the bound of -5 %, False if one lies completely below it, else None.
     """
     return all_hold(decides(interval(ours - other), least=-MARGIN * float(other.mean())) for other in theirs)
 

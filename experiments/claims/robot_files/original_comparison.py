@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compares, pose by pose, how this library and how the MoBeE program of 2014 read a robot file of 2010 to 2014."""
+"""Compares two readings of a robot file of 2010 to 2014, pose by pose: by this library, and by the rules of the MoBeE program of 2014."""
 
 from __future__ import annotations
 

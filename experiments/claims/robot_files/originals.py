@@ -87,10 +87,10 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 def results(folder: Path) -> dict[str, Any]:
     """Write the table of the run in `folder`, and return the counts of its files.
 
-    Keys: "files", "robots" and "load", numbers of files; "share", of files that load; "compared" and "agree", numbers of robots that were
-    compared, and of those whose two readings agree; "poses" and "contacts", numbers of poses and of contacts, summed over the compared
-    robots; "table", path of the table; "passed", whether at least 95 % of the files load and all compared robots agree.  Raises
-    InvalidValue if no file was read yet.
+    Keys: "files", "robots" and "load", numbers of files; "share", of files that load; "compared", number of robots that this
+    library and `program_2014` have both read; "agree", number of those for which the results agree; "poses" and "contacts", numbers of
+    poses and of contacts, summed over the compared robots; "table", path of the table; "passed", whether at least 95 % of the files load
+    and all compared robots agree.  Raises InvalidValue if no file was read yet.
     """
     rows = read_records(folder / RECORDS, COLUMNS)
     if not rows:

@@ -85,7 +85,7 @@ def read(folder: Path) -> list[Measured]:
 
 
 def failures(one: Measured) -> list[str]:
-    """Return short texts that name the parts of the claim that a robot does not meet; [] if it meets all."""
+    """Return a short text for each limit of the claim that a robot exceeds, as "drifts" or "slow"; [] if it exceeds none."""
     judged = {
         "drifts": one.drift_deg > MAX_DEGREES or one.drift_mm > MAX_MILLIMETRES,
         "touches itself at home": one.touching_after > 0,
@@ -98,11 +98,11 @@ def failures(one: Measured) -> list[str]:
 def results(folder: Path) -> dict[str, Any]:
     """Return the worst value of each measurement over all robots of the run in `folder`, the robots that fail, and "passed".
 
-    "robots": number of robots that could be read.  "failed": dict from the name of a robot to a list of short texts about the parts of the
-    claim that it does not meet, as in `failures`.  "refused": dict from the name of a robot that could not be read to the reason.  "touch
-    themselves at home" and "and with the SRDF": numbers of robots with contacts at home, without and with the written SRDF, a file that
-    lists pairs of links not to be tested.  "worst_..." and "longest_...": the worst values, None without robots.  "passed": whether no
-    robot failed or was refused, None without robots.
+    "robots": number of robots that could be read.  "failed": dict from the name of a robot that fails to the texts that `failures` returns
+    for it.  "refused": dict from the name of a robot that could not be read to the reason.  "touch themselves at home": number of robots
+    with contacts at home before an SRDF (a file that lists pairs of links not to be tested) is written; "and with the SRDF": the same with
+    the written SRDF.  "worst_..." and "longest_...": the worst values, None without robots.  "passed": whether no robot failed or was
+    refused, None without robots.
     """
     found, refused = read(folder), read_records(folder / REFUSED, ("robot", "why"))
     failed = {one.robot: failures(one) for one in found if failures(one)}

@@ -39,9 +39,10 @@ class Volume:
 class Node:
     """A <link> or <joint> of a file, as a node of the tree.
 
-    `axis`: vector from start to end of a link [m], or rotation axis of a joint, (3,).  `limits`: of a joint [deg].  `motor`: name of the
-    motor of a joint.  `solids` and `fields`: its solid volumes, and those that are not solid.  `hand`: the node with noSelfCollision="true"
-    in whose subtree this one is, which may be the node itself; None without such a node.
+    `part`: name of its body part, "" outside of one.  `axis`: vector from start to end of a link [m], or rotation axis of a joint, (3,).
+    `limits`: of a joint [deg]; not used for a link.  `motor`: name of the motor of a joint.  `solids`: its solid volumes.  `fields`: its
+    volumes that are not solid.  `hand`: the node with noSelfCollision="true" in whose subtree this one is, which may be the node itself;
+    None without such a node.
     """
 
     is_link: bool
@@ -170,7 +171,7 @@ class Program:
         return step
 
     def ignored(self) -> tuple[set[frozenset[Node]], set[frozenset[Node]]]:
-        """Return two sets of pairs of nodes that are never tested against each other: for solids, and for fields."""
+        """Return the pairs of nodes whose solid volumes, and those whose other volumes (fields), are never tested against each other."""
         solids, fields = set[frozenset[Node]](), set[frozenset[Node]]()
         roots = [node for node in self.nodes if node.parent is None]
 

@@ -36,9 +36,10 @@ class FileRecord(Row):
     `outcome`: "loads", "thing" (no joint moves, so it is no robot), "refused" or "crash".  `message`: why it was refused, crashed or not
     compared.  `links`: number of links whose frames were compared.  `srdf`: name of the SRDF that was found; `home`: name of the pose in
     it.  `seconds`: time to load, with default options.  `frame_error`: largest difference of an element of a link's frame from Pinocchio's
-    [m or 1].  `contacts`: number of pairs of links that touch by the collision library coal, summed over all poses; `other`: the same for
-    pairs that touch, by more than 1e-6 m, by coal or by this library only; `deepest_other`: largest depth of a contact that only one of
-    them finds [m].  `at_home`: number of solid contacts at home, with default options; `at_home_without`: the same without an SRDF.
+    [m or 1].  `contacts`: number of pairs of links that touch by the collision library coal, summed over all poses.  `other`: number of
+    pairs that touch by more than 1e-6 m, but only by coal or only by this library, summed likewise; `deepest_other`: largest depth of a
+    contact that only one of them finds [m].  `at_home`: number of solid contacts at home, with default options; `at_home_without`: the same
+    without an SRDF.
     """
 
     PLACES = None  # frames differ by 1e-16
@@ -167,7 +168,7 @@ class PeerFailed(Exception):
 
 
 class UrdfPeer:
-    """The robot of a URDF file as Pinocchio reads it; its joints are set to the positions of this library's joints."""
+    """The robot of a URDF file as Pinocchio reads it; its methods take joint positions in the order of this library."""
 
     def __init__(self, path: Path, robot: Robot) -> None:
         """Read the file.  `robot`: the same file as this library reads it.  Raises NotInstalled without Pinocchio, and PeerFailed."""

@@ -80,9 +80,9 @@ def read_all(path: Path) -> list[FileRecord]:
 def results(found: Sequence[FileRecord]) -> dict[str, Any]:
     """Return the results of all files.
 
-    Keys: "sets", dict from the name of a set of files, or "all", to the dict that `numbers` returns for it; "refused" (or crashed),
-    "contacts_that_differ" and "not_compared", dicts from the name of a file to a text that says why or how much; "passed", whether no file
-    crashes, frames differ by at most 1e-9, and no contact differs.
+    Keys: "sets", dict from the name of a set of files, or "all", to the dict that `numbers` returns for it.  Three dicts from the name of a
+    file to a text: "refused", why it was refused or crashed; "contacts_that_differ", how many, and the largest depth; "not_compared", why.
+    "passed", whether no file crashes, frames differ by at most 1e-9, and no contact differs.
     """
     sets = {set_name: [one for one in found if one.name.startswith(f"{set_name}/")] for set_name in dict.fromkeys(map(_set_of, found))}
     table = {set_name: numbers(some) for set_name, some in {**sets, "all": list(found)}.items()}

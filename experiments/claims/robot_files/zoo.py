@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The zoo: whether robots by other authors explore by curiosity with their files as they are, and how deep they touch themselves meanwhile.
 
-Claim: every robot of six collections loads as it is.  `mobee.derive` computes its arms with their joints, its home, the tested pairs and
-the fields.  The robot touches nothing at home.  In ten minutes of curious exploration with the derived gains it touches itself no deeper
-than 2 mm.  A single agent tries every action of the states that it visits.  For a robot that fails, one line of the table says in what.
+Claim: every robot of six collections loads as it is.  `mobee.derive` computes its arms with their joints, its home, the pairs that are
+tested for contacts, and the fields.  The robot touches nothing at home.  In ten minutes of curious exploration with the derived gains it
+touches itself no deeper than 2 mm.  A single agent tries every action of the states that it visits.  If a robot fails, its line of the
+table names each failure.
 Source: aims of this reproduction; the thesis has one robot.  Published number: none.  Run time: 15 seconds for each robot.
 
 The collections are icub_models, pybullet_data, example-robot-data (URDF), robosuite, dm_control and kinova (MJCF); kinova are the robots of
@@ -54,12 +55,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 class Measured(Row):
     """The measurements of one robot.
 
-    `arms`: names of the parts that learn.  `joints`: how many joints each of them has.  `errors`, `warnings`: numbers of findings of `mobee
-    check` about the derived robot.  `at_home`: number of contacts at home, of solids and fields.  `load_s`, `derive_s`: times to load the
-    file and to derive arms, limits and fields from it [s].  `transitions`: number of observed transitions while all arms learn at once.
-    `depth_mm`: depth of the deepest solid contact meanwhile; `touching`: names of the two solids.  One arm also learns alone: `tried`,
-    number of state-actions that its agent has tried; `can_be_tried`, number of actions of all states that it has visited; `state_actions`,
-    number of all state-actions.
+    `motors`: number of motors.  `arms`: names of the parts that learn.  `joints`: how many joints each of them has.  `errors`, `warnings`:
+    how many errors and warnings `mobee check` finds in the derived robot.  `at_home`: number of contacts at home, of solids and fields.
+    `load_s`, `derive_s`: times to load the file and to derive arms, limits and fields from it [s].  `transitions`: number of observed
+    transitions while all arms learn at once.  `depth_mm`: depth of the deepest solid contact in this time; `touching`: names of the two
+    solids.  One arm also learns alone; a state-action is one action in one state.  `tried`: number of state-actions that its agent tried.
+    `can_be_tried`: number of state-actions in the states that the agent has visited.  `state_actions`: number of state-actions in all
+    states.
     """
 
     robot: str
@@ -123,7 +125,8 @@ def _ascii(text: str) -> str:
 def measure(name: str, file: Path, minutes: float, actions: int, seed: int) -> Measured:
     """Measure one robot from its file; raises MobeeError if it cannot be read, or if no part of it can learn.
 
-    `minutes`: robot time in which all arms learn.  `actions`: transitions of the agent that learns alone.  `seed`: of all random choices.
+    `minutes`: robot time in which all arms learn.  `actions`: largest number of transitions of the agent that learns alone.  `seed`: of all
+    random choices.
     """
     start = time.perf_counter()
     robot = load_robot(file)

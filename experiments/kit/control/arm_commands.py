@@ -73,7 +73,10 @@ def random_command(rng: np.random.Generator, forced: bool) -> Command:
 
 
 def vary(rng: np.random.Generator, one: Command, other: Command) -> Command:
-    """Return the command `one` with small random changes, and in 30 % of the cases with some phases of the command `other`."""
+    """Return the command `one` with small random changes.
+
+    In 30 % of the cases, each phase of `one` is first replaced, with probability 0.5, by the same phase of the command `other`.
+    """
     step = rng.choice(STEPS)
     take = rng.random(PHASES) < (0.5 if rng.random() < 0.3 else 0.0)
     attractors = np.where(take[:, None], other.attractors, one.attractors)

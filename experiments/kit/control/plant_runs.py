@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Recorded runs of the offline plant under the control law, and forces of a client during them."""
+"""Recorded runs of the offline plant under the control law, and forces (PUSHES) that a client program can exert during a run."""
 
 from __future__ import annotations
 
@@ -61,8 +61,8 @@ def run_plant(
 ) -> PlantRun:
     """Run the plant for `seconds`, at least one tick, and return the recording.
 
-    `before`: function of the number of a tick, counted from 0, that is called before the tick.  `at`: the ticks before which it is called;
-    None: all ticks.
+    `before`: function that is called before a tick, with the index of the tick, counted from 0.  `at`: indices of the ticks before which
+    it is called; None: all ticks.
     """
     ticks = max(1, round(seconds / plant.dt))
     calls = () if before is None else range(ticks) if at is None else at
@@ -77,7 +77,7 @@ def run_plant(
 def place(plant: OfflinePlant, q: Array) -> None:
     """Put a plant at rest in the posture q (n,) rad, with its attractor there.
 
-    The plant runs for REST_TIME (0.4 s), and the joints are put back to q before every tick, until the motors are at rest.
+    The plant runs for REST_TIME (0.4 s); after this time the motors are at rest.  The joints are put back to q before every tick.
     """
     plant.controller.reset(q)
     for _ in range(round(REST_TIME / plant.dt)):
@@ -90,8 +90,8 @@ def place(plant: OfflinePlant, q: Array) -> None:
 def random_posture(robot: Robot, rng: np.random.Generator, motors: Mapping[str, int], within: tuple[float, float]) -> Array:
     """Draw a random posture (n,) rad of a robot.
 
-    `motors`: by the name of a part, how many of its motors are drawn, from the first on; all other motors are at home.  `within`: lowest
-    and highest share of a motor's range between which its position is drawn uniformly.
+    `motors`: dict from the name of a part to a number k: the positions of its first k motors are drawn; all other motors are at home.
+    `within`: lowest and highest share of a motor's range; the position is drawn uniformly between them.
     """
     q = robot.home.copy()
     for part, count in motors.items():

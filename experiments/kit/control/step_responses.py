@@ -26,11 +26,12 @@ MARGIN = np.deg2rad(15.0)  # rad, distance of a posture from every constraint
 
 @dataclass(frozen=True, slots=True)
 class StepResponse:
-    """Measures of a step response of several joints: each number is the largest over the judged joints.
+    """Measures of a step response: each number is the largest over all joints whose step is at least MIN_STEP (5 degrees).
 
-    `settling`: s until the joint stays within 5 % of the step around its end position.  `overshoot`: share of the step.  `error_deg`:
-    degrees between end position and attractor.  `rest_deg`: standard deviation in the last second, degrees.  `is_settled`: whether all
-    joints settled before the last second.
+    The end position of a joint is its mean position in the last second.  `settling`: time until the joint stays within 5 % of the step
+    around its end position, s.  `overshoot`: largest motion beyond the end position, as share of the step.  `error_deg`: distance between
+    end position and attractor, degrees.  `rest_deg`: standard deviation in the last second, degrees.  `is_settled`: whether all joints
+    settled before the last second.
     """
 
     settling: float  # s
@@ -57,8 +58,8 @@ def motor_step(motor: int) -> tuple[Array, Array]:
 def postures(count: int, seed: int) -> list[Array]:
     """Draw `count` postures (n,) rad of torso and arms, for a motion from home through all of them in order.
 
-    On the path to each posture no solids touch and no fields, which are larger volumes around the solids, and every cable constraint is at
-    least 15 degrees away.  `seed`: of the draw.
+    On the path to each posture there are no contacts, neither of solids nor of fields (larger volumes around the solids).  Every cable
+    constraint is at least 15 degrees away.  `seed`: seed of the random postures.
     """
     robot, rng = icub().robot, np.random.default_rng(seed)
     found = [robot.home]

@@ -71,8 +71,9 @@ class RrtPlanner:
     def path(self, start: Array, goal: Array, azimuth: float, blocked: Array) -> Array | None:
         """Return a path (K, n) rad from the posture `start` (n,) to the pre-grasp `goal` (n,), or None if no path was found.
 
-        `azimuth` is not used.  `blocked`: (B, 3) m, root frame, positions of the palm at earlier bumps: up to 10 paths are drawn, and the
-        first on which the palm moves around or over these positions is returned.  If there are no such positions, the path is shortened.
+        `azimuth` is not used.  `blocked`: (B, 3) m, root frame, positions of the palm where the arm bumped into something before.  If there
+        are such positions, up to 10 random paths are planned, and the first on which the palm moves around or over them is returned.  If
+        there are none, one path is planned and shortened.
         """
         for _ in range(TRIES if len(blocked) else 1):
             path = rrt_connect(self._world, start, goal, MOTORS, int(self._rng.integers(2**31)))
@@ -85,9 +86,10 @@ class RrtPlanner:
 
 
 def shortened(world: Model, path: Array, rng: np.random.Generator) -> Array:
-    """Return the path (K, n) rad with fewer corners: straight motions between random corners replace the path if free.
+    """Return the path (K, n) rad with fewer corners.
 
-    A motion is free if nothing touches on it.  `world`: the robot in the world that it must not touch.
+    Two corners are chosen at random, many times.  If the straight motion between them is without contacts of solids, the corners between
+    them are removed.  `world`: the robot in the world that it must not touch.
     """
     corners = list(path)
     for _ in range(SHORTCUTS):

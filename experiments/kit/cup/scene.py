@@ -98,9 +98,10 @@ class Eyes:
         return Upright(place + SEEN * self._rng.standard_normal(2), RADIUS, HEIGHT, TOP)
 
     def show(self, world: World, cup: Upright, margin: float) -> None:
-        """Add the cup, and the clutter that the cameras see, to a world, enlarged by a margin [m].
+        """Add the cup, and the clutter that the cameras see, to a world.
 
-        The objects have the role "target".  `cup`: the cup as `Eyes.cup` returns it.  The places of the clutter get new random errors.
+        Each of these objects is enlarged by `margin` [m] on all sides, and has the role "target".  `cup`: the cup as `Eyes.cup` returns it.
+        The places of the clutter get new random errors.
         """
         world.add(CUP, cylinder(RADIUS, HEIGHT).grown(margin), position=standing(cup.place, HEIGHT), role="target")
         for name, piece in self._scene.clutter.items():

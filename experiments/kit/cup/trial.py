@@ -43,15 +43,15 @@ GOALS = 24
 class Result:
     """The measures of a trial, in m, rad and s; -1: not measured, because the trial ended earlier.
 
-    At the end of the motion to the pre-grasp, the pose with the open hand beside the cup: `distance`: of the palm from its place beside the
-    true cup; `angle`: between the palm's normal and its wanted direction; `pushed`: largest distance by which a thing was moved; `knocked`:
-    whether a thing leans more than 25 degrees; `pre_grasp`: whether the palm is at most 2 cm and 15 degrees from its place, and nothing was
-    knocked over.
+    The pre-grasp is the pose with the open hand beside the cup.  Measured at the end of the motion to it: `distance`: distance of the palm
+    from its wanted place beside the true cup.  `angle`: angle between the palm's normal and its wanted direction.  `pushed`: largest
+    distance by which a thing was moved.  `knocked`: whether a thing leans more than 25 degrees.  `pre_grasp`: whether `distance` is at most
+    2 cm, `angle` is at most 15 degrees, and nothing was knocked over.
 
-    At the end of the trial: `lifted`: height by which the cup was lifted.  `placed`: distance of the cup from its goal.  `done`: whether
-    the cup was lifted, and put down upright near its goal, and nothing was knocked over.  `bumps`: number of bumps on the motion to the
-    pre-grasp.  `plans`: how often a path was planned.  `planning`: processor time of the plans.  `clutter`: number of pieces of clutter.
-    `why`: reason of a failure.  `seconds`: simulated time.
+    Measured at the end of the trial: `lifted`: height by which the cup was lifted.  `placed`: distance of the cup from its goal.  `done`:
+    whether the cup was lifted, and put down upright near its goal, and nothing was knocked over.  `bumps`: number of bumps on the motion to
+    the pre-grasp.  `plans`: how often a path was planned.  `planning`: processor time of the plans.  `clutter`: number of pieces of
+    clutter.  `why`: reason of a failure.  `seconds`: simulated time.
     """
 
     pre_grasp: bool = False
@@ -71,8 +71,9 @@ class Result:
 
 
 class Trial:
-    """A trial: the scene, the plant with the true world and the world as the cameras see it, and the planner; `run` performs it.
+    """A trial in a random scene; `run` performs it.
 
+    The physics has the true world.  The robot's model has the world as the cameras see it, with small errors and without hidden clutter.
     `method`: "map" (pre-grasp map), "learner" (learned reacher) or "rrt" (RRT-Connect).  `seed`: seed of the scene, the errors of the
     cameras and the plant.
     """

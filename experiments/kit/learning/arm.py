@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The published learners: robot, plants, state spaces and agents of thesis chapter 7 and paper section 3, and poses of the left arm.
 
-The robot is `icub_2014` under the gains of 2014, with a control period of 20 ms; its motors are the plant's defaults (docs/plant.md).
-Motors that do not take part are rigid: those of the arms in the middle of their range, as in the goals of the actions, all others at home.
+The robot is `icub_2014` with the gains published in 2014 and a control period of 20 ms; its motors are the plant's defaults
+(docs/plant.md).  Motors that take no part in learning do not move.  Those of the arms are in the middle of their range, where the goals of
+the actions have them, too; all others are at home.
 """
 
 from __future__ import annotations
@@ -106,7 +107,8 @@ def torso_space(tie_seed: int = 0) -> Lattice:
 def table_agents(plant: OfflinePlant, explorer: str = "curious", seed: int = 0, tie_seed: int = 0, **settings: Any) -> list[CuriousAgent]:
     """Return the agents of torso, left arm and right arm of the experiment at the table; both arms have the same graph.
 
-    `explorer`, `seed`, `settings`: passed to `CuriousAgent`.  `tie_seed`: of the choice among equally near states as neighbours.
+    `explorer`, `seed`, `settings`: passed to `CuriousAgent`.  `tie_seed`: seed of the random choice of neighbours among equally
+    near states.
     """
     arms = [arm_space(RANK3, ARM_NEIGHBOURS, tie_seed, joints) for joints in (LEFT, RIGHT)]
     return [CuriousAgent(space, plant, explorer, seed, **settings) for space in (torso_space(tie_seed), *arms)]
@@ -125,10 +127,11 @@ def arm_clauses() -> list[Clause]:
 
 @cache
 def min_margin() -> float:
-    """Return the distance from a cable constraint (the value of a.q + b) from which on a pose counts as clear of this constraint.
+    """Return the smallest value of a.q + b [rad] at which a pose counts as clear of a cable constraint.
 
-    It is half the width of the zone in which the published control law pushes the arm away from a constraint.  At this distance the force
-    moves a resting arm by about three degrees, a quarter of the distance to the edge of a cell of the lattice with three levels per joint.
+    It is half the width of the zone in which the published control law pushes the arm away from a constraint.  At this value the force
+    moves a resting arm by about three degrees.  In the lattice with three levels per joint, this is a quarter of the distance from a state
+    to the edge of its cell, the region of poses that are nearest to this state.
     """
     return Gains.published_2014().constraint_width / 2.0
 

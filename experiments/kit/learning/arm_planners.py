@@ -111,10 +111,11 @@ class Roadmap:
         return [int(v) for v in np.argsort(self._lengths(pose), kind="stable")[:count]]
 
     def reachable(self, pose: Array, neighbours: int) -> list[int]:
-        """Return those of the `neighbours` vertices nearest to a pose (4,) rad to which a straight motion from the pose is sound.
+        """Return the indices of vertices near a pose (4,) rad that can be reached from it by a straight motion.
 
-        Sound: clear of contacts and cable constraints in the planner's model.  If there is none, the cable constraints are ignored; if
-        there is still none, all these nearest vertices are returned.
+        The `neighbours` nearest vertices are examined.  Those are returned to which the motion is sound: clear of contacts and cable
+        constraints in the planner's model.  If there is none, the cable constraints are ignored.  If there is still none, all of the
+        examined vertices are returned.
         """
         near = self.nearest(pose, neighbours)
         for cables in (True, False):  # a pose that violates the cable constraints may still be reached
@@ -167,8 +168,8 @@ def edge(first: int, second: int) -> Edge:
 def make_roadmap(kind: str, belief: Belief, lattice: Lattice, seed: int) -> Roadmap:
     """Build a roadmap whose motions are all sound in the planner's model: clear of contacts and of the cable constraints that it knows.
 
-    `kind`: "OMPL": a PRM with 300 vertices; "lattice": the sound samples (poses of states) and sound actions of the lattice.  `seed`: seed
-    of the PRM.
+    `kind`: "OMPL": a PRM with 300 vertices; "lattice": the vertices are the poses of the lattice's states, and the edges are its actions,
+    as far as they are sound.  `seed`: seed of the PRM.
     """
     if kind == "OMPL":
         return ompl_roadmap(belief, MILESTONES, NEIGHBOURS, seed)
@@ -243,9 +244,9 @@ class Straight:
 
 
 class PlannedOnce:
-    """A `Rival` that plans one path through a roadmap and moves to its vertices one after the other, wherever the motions end.
+    """A `Rival` that plans one path through a roadmap and moves to its vertices one after the other, even if motions do not reach them.
 
-    `vertex_of`: vertex of each goal state, by the state.  `neighbours`: number of near vertices at which the path may start.
+    `vertex_of`: dict from each goal state to its vertex.  `neighbours`: the path may start at one of this number of nearest vertices.
     """
 
     repairs = 0
@@ -293,7 +294,7 @@ class Repaired:
         self.repairs = 0
 
     def begin(self, goal: int) -> None:
-        """Start a query for the state `goal`, as in `Rival.begin`; without memory, all removed motions are available again."""
+        """Start a query for the state `goal`, as in `Rival.begin`; unless `remembers` is set, removed motions are available again."""
         self._goal, self._at = self._vertex_of[goal], None
         if not self._remembers:
             self._out.clear()
@@ -301,7 +302,7 @@ class Repaired:
     def aim(self, q: Array) -> Array | None:
         """Return the pose (4,) rad of the next vertex of the cheapest path from q (4,) rad, as in `Rival.aim`; None if there is no path.
 
-        If the removed motions leave no path, all of them become available again.
+        If there is no path without the removed motions, all of them are restored, and the path is planned again.
         """
         path = self._path(q)
         if not path:  # too many motions were removed: some fail only sometimes
@@ -313,7 +314,7 @@ class Repaired:
         return self._roadmap.pose(self._to)
 
     def observe(self, start: Array, end: Array) -> None:
-        """Remove the last motion if it ended more than 1/8 of a joint's range away from its vertex; then `repairs` is increased by 1.
+        """Remove the last motion from later plans if it missed its vertex by more than 1/8 of a joint's range; `repairs` then grows by 1.
 
         `start`, `end`: poses (4,) rad in which the motion started and ended, as in `Rival.observe`.
         """
@@ -352,7 +353,7 @@ class Learned:
         self._goal = goal
 
     def aim(self, q: Array) -> Array | None:
-        """Return the next pose (4,) rad: the sample of the state to which the planned action leads from the state of the pose q (4,) rad.
+        """Plan the next action from the pose q (4,) rad, and return the sample of its goal state, a pose (4,) rad.
 
         The sample of a state is the pose that stands for it.  The planned action is remembered for the next call of `observe`.
         """

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Equal agents on the offline plant and on the live processes in lockstep, and the distances between their outcomes.
+"""Lets agents with the same settings learn on the offline plant and on the live system, and compares the outcomes of their actions.
 
-The transitions are stored on disk as soon as they are made.  The transitions of one run are a record; the distance of two records is the
-total variation between the outcomes of a state-action, averaged over the state-actions.
+The live system runs in lockstep: each tick waits for all services.  Its transitions are stored on disk as soon as they are made.  In this
+module, a record is the transitions of one run.  The distance of two records is the total variation between the outcomes of a state-action,
+averaged over the state-actions.
 """
 
 from __future__ import annotations
@@ -90,14 +91,14 @@ TASKS = {
 
 
 def space(robot: Robot, task: Task, part: str) -> Lattice:
-    """Return the lattice of a part, with three values of each joint (rank 3) and as many neighbours as the task states."""
+    """Return the lattice of a part, with three levels of each joint and as many neighbours as the task states."""
     return Lattice(robot, JOINTS[part], neighbours=task.neighbours[part])
 
 
 def offline_plant(task: Task, seed: int) -> OfflinePlant:
     """Return a plant of the whole iCub in the world of the task, with the motor model that was identified on PyBullet.
 
-    `seed`: of the plant.
+    `seed`: seed of the encoders' noise.
     """
     model = Model(load_robot(ROBOT), load_world(task.world))
     return OfflinePlant(model, seed, Gains.named(GAINS), MotorParameters.identified(ROBOT), 1.0 / RATE)
@@ -112,7 +113,9 @@ def agents(task: Task, plant: Plant, seed: int) -> list[CuriousAgent]:
 
 
 def learn_offline(cell: Cell) -> dict[str, Any]:
-    """Learn on the offline plant; the settings of the cell are `task` (name of a task) and `transitions` (number for each part).
+    """Let the agents of a task learn on the offline plant, as one run of a sweep.
+
+    `cell`: the run: its seed, and the settings `task` (name of a task) and `transitions` (number for each part).
 
     Returns for each part "seen_<part>": transitions (T, 3): state, action, state reached; and "touched_<part>": (T,), whether a transition
     ended in contact with an object of the world.
@@ -227,7 +230,7 @@ def shares(counts: Ints) -> Array:
 
 
 def distance(first: Counts, second: Counts, least: int) -> Distance:
-    """Return the distance of two records of transitions, over the state-actions of all parts that both tried at least `least` times.
+    """Return the distance of two records of transitions, over all state-actions that have at least `least` tries in each record.
 
     `first`, `second`: counts of outcomes (S, A, S) by part.  If there are no such state-actions, `variation` and `agree` are NaN and
     `compared` is 0.
@@ -241,7 +244,7 @@ def distance(first: Counts, second: Counts, least: int) -> Distance:
 
 
 def mean(distances: Sequence[Distance]) -> Distance:
-    """Return a distance whose numbers are the means of the numbers of several distances; the mean of `compared` is rounded."""
+    """Return the mean of several distances, field by field; the mean of the field `compared` is rounded to an integer."""
     rows = np.array([(one.variation, one.agree, one.compared) for one in distances])
     variation, agree, compared = rows.mean(axis=0)
     return Distance(float(variation), float(agree), round(float(compared)))
@@ -251,9 +254,9 @@ def mean(distances: Sequence[Distance]) -> Distance:
 class Compared:
     """How far the outcomes of a task on each live robot, and in each offline run, are from those of other offline runs.
 
-    `live`: mean distance of each live robot, by name.  Each offline run is left out in turn, the distance of the robot from all other
-    offline runs together is computed, and these distances are averaged.  `offline`: for each offline run, its distance from all other
-    offline runs together.
+    `offline`: for each offline run, its distance from all other offline runs together.  `live`: mean distance of each live robot, by name:
+    with each offline run left out in turn, the distance between the robot and the remaining offline runs together is computed; the mean
+    of these distances is taken.
     """
 
     live: dict[str, Distance]
@@ -265,7 +268,7 @@ class Compared:
 def compared(folder: Path, task: str, least: int) -> Compared:
     """Compare the outcomes that the live robots and the offline runs recorded for a task in the folder of an experiment's run.
 
-    `task`: "arms", "table" or "published".  `least`: tries that a state-action must have on both sides of a comparison to be counted.
+    `task`: "arms", "table" or "published".  `least`: only state-actions with at least this number of tries in both records are compared.
     Raises InvalidValue if fewer than two offline runs have finished.
     """
     results = [r for r in load_cells(folder).values() if r.cell.settings["task"] == task]
@@ -340,7 +343,7 @@ def contacts(folder: Path, task: str) -> dict[str, dict[str, Contacts]]:
 
 
 def contact_rows(folder: Path, task: str) -> dict[str, dict[str, int]]:
-    """Return the numbers that `contacts` returns as rows of a table: a dict from "robot, part" to the numbers by column title."""
+    """Return the counts of `contacts` as a table: for each row title "robot, part" a dict from the column title to the count."""
     return {
         f"{robot}, {part}": {
             "actions": one.actions,
@@ -357,10 +360,10 @@ COLORS = {"pybullet": "tab:red", "mujoco": "tab:green", "kinematic": "tab:blue"}
 
 
 def draw_distances(tasks: Mapping[str, Compared], least: int) -> Any:
-    """Draw the distances of live robots and offline runs, and the success of single actions, in one row of panels for each task.
+    """Draw the distances of live robots and offline runs, and how often each action reached its goal: a row of three panels for each task.
 
-    `tasks`: the comparison by the name of the task.  `least`: tries that a state-action must have on both sides of a comparison to be
-    counted.  Returns a Matplotlib Figure.
+    `tasks`: the comparison by the name of the task.  `least`: the third panel has only state-actions with at least this number of tries,
+    both live and offline.  Returns a Matplotlib Figure.
     """
     drawing = new_figure(13.0, 4.2 * len(tasks))
     panels = drawing.subplots(len(tasks), 3, squeeze=False)

@@ -26,7 +26,7 @@ UNCERTAIN = (0.1, 0.9)  # shares of failures between which the outcome of an act
 def in_order(seen: Ints) -> Ints:
     """Return the transitions `seen` (T, 3) sorted by state, action and outcome.
 
-    Sorted transitions compress much better.  They are sufficient if only counts are computed from them, because the order in time is lost.
+    Sorted transitions compress much better, but their order in time is lost.  Counts of outcomes can still be computed from them.
     """
     return seen[np.lexsort(seen.T[::-1])]
 
@@ -146,10 +146,11 @@ Groups = dict[tuple[str, str], list[Explored]]  # values of two settings
 
 
 def explored(found: Mapping[str, CellResult], space_of: Callable[[str], Lattice], where: str, how: str) -> Groups:
-    """Return the counts of the finished cells in groups: a list sorted by seed for each pair of values of the settings `where` and `how`.
+    """Count tries, failures and visits in the runs of a sweep, and return the counts in groups of runs with equal settings.
 
-    `found`: the finished cells (runs of a sweep) by name; each has its transitions as the value "seen".  `space_of`: returns the space for
-    a value of the setting `where`.
+    The key of a group is a pair: the values of the settings `where` and `how`.  The group is a list of runs, sorted by seed.  `found`: the
+    finished runs by name; each has its transitions as the value "seen".  `space_of`: function that returns the space for a value of the
+    setting `where`.
     """
 
     def of(result: CellResult) -> Explored:
@@ -176,10 +177,10 @@ def relative_tries(tries: Ints, chosen: NDArray[np.bool_]) -> float:
 
 
 def relative_tries_of(judged: Sequence[Explored], runs: Sequence[Explored]) -> list[float]:
-    """Return for each judged run the mean tries of the state-actions at constraints divided by those of all others; NaN is left out.
+    """Return for each judged run the mean tries of state-actions at constraints, divided by the mean tries of the other state-actions.
 
-    The state-actions at constraints are those of `constraint_actions` of all other `runs`.  The judged run itself is left out, so that the
-    tries of an action that failed by chance do not count on both sides.
+    A state-action is at a constraint if it failed in more than half of its tries in all `runs` together, without the judged one.  So an
+    action is not selected because it failed by chance in the judged run.  Runs whose ratio is NaN are left out.
     """
     ratios = [relative_tries(one.tries, constraint_actions([run for run in runs if run is not one])) for one in judged]
     return [ratio for ratio in ratios if np.isfinite(ratio)]

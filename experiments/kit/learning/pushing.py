@@ -127,13 +127,13 @@ class Stage:
 
 
 def push_to(stage: Stage, goals: Sequence[int], tries: int, most: int, beliefs: OutcomeModel | None, seed: int) -> list[bool]:
-    """Push the cup from its first place to goal cells, by plans, or by random actions; returns the success of each try.
+    """Try to push the cup from its first place to goal cells, by planned or random actions; return the success of each try.
 
     A try is a success if the cup is perceived in the goal cell after one of at most `most` actions.
 
     Args:
         stage: arm, cup and agent.
-        goals: the goal cells, which take turns.
+        goals: indices of the goal cells; the tries use them in turn: try i, counted from 0, has goals[i % len(goals)].
         tries: number of tries.
         most: largest number of actions of a try.
         beliefs: transition model for the plans; None: all actions are random.  Where the plan finds no action that leads to the goal, the

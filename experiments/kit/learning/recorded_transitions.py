@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads all transitions of a run: from the SQLite stores of its agents, and from the cells of a sweep."""
+"""Reads all transitions of a run: from the SQLite stores of its agents, and from the results of a sweep's single runs (cells)."""
 
 from __future__ import annotations
 
@@ -21,9 +21,10 @@ SEEN = "seen"  # the array of a cell with one agent's transitions; with several 
 class Record:
     """The transitions of one agent.
 
-    `source`: the file of the transitions, relative to the run's folder.  `agent`: name of the agent; "" in a cell (one run of a sweep) with
-    one agent.  `settings`: settings of the agent, or of the cell.  `columns`: dict from a column's name to its values, a value for each
-    transition.  A cell has only the columns n (number of the transition, from 1), s (state), a (action) and s_next (state reached).
+    They come from a database, or from a cell, which is one run of a sweep.  `source`: the file of the transitions, relative to the run's
+    folder.  `agent`: name of the agent; "" if a cell has only one agent.  `settings`: settings of the agent, or of the cell.  `columns`:
+    dict from a column's name to its values, a value for each transition.  A cell has only the columns n (number of the transition, from 1),
+    s (state), a (action) and s_next (state reached).
     """
 
     source: str

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Explorers of the literature for the agent of this library, and tabular worlds with rewards that the agent does not know in advance.
 
-An explorer decides which action an agent takes; each one here is a function as described at `mobee.learning.explorers.Explorer`.  Its plans
-use only the counts of the agent: an action that was never tried is believed to stay in its state.
+An explorer decides which action an agent takes; each one here is a function as described at `mobee.learning.explorers.Explorer`.
+`CountBonus`, `RMax` and `EpsilonGreedy` plan with the transition model of `learned`: frequencies of the outcomes that the agent observed.
 """
 
 from __future__ import annotations
@@ -49,9 +49,10 @@ class RewardedPlant(TabularPlant):
 
 
 def learned(agent: Explorable) -> Any:
-    """Return the agent's transition model with probabilities from its counts alone.
+    """Return a transition model whose probabilities are the frequencies of the outcomes that the agent observed.
 
-    An action that was never tried is believed to stay in its state.
+    An action that was never tried is believed to stay in its state.  To this end, each action has an imagined outcome with the count
+    1e-6: its goal, which is the state itself in the worlds of this module.
     """
     return agent.model.debiased(goal=PRIOR, stay=0.0)
 
@@ -64,9 +65,9 @@ def row(values: Array, state: int) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Curious:
-    """The published curiosity with an external reward: the reward is the information gain plus `weight` times the external reward.
+    """An explorer with the published curiosity and an external reward: it plans with information gain plus `weight` times that reward.
 
-    The external reward of an action is taken to be 0 before its first try.
+    The external reward of an action is assumed to be 0 before the first try of the action.
     """
 
     plant: RewardedPlant
@@ -141,7 +142,7 @@ class PosteriorSampling:
 
 @dataclass(frozen=True, eq=False)
 class EpsilonGreedy:
-    """An explorer that takes the best action by the observations so far, and with probability `share` a random action."""
+    """An explorer that takes a random action with probability `share`, else the best one by the outcomes and rewards observed."""
 
     plant: RewardedPlant
     share: float
@@ -156,7 +157,7 @@ class EpsilonGreedy:
 def all_counts(agent: Explorable) -> Array:
     """Return how often each state-action led to each state, (S, A, S).
 
-    The model's pseudo-counts of its prior (imagined outcomes), which it has before the first try, are not counted.
+    Only real outcomes are counted: the imagined outcomes, which are the prior of the agent's model, are subtracted.
     """
     model = agent.model
     real = np.where(model.counts > 0.0, model.counts - model.imagined, 0.0)
@@ -194,8 +195,8 @@ def rooms(width: int = 11, slip: float = 0.1) -> TabularWorld:
 def random_world(seed: int, states: int = 50, actions: int = 4, branches: int = 5) -> TabularWorld:
     """Return a world in which each action leads to `branches` random states with random probabilities (Archibald et al. 1995).
 
-    `seed`: of the draw.  Every action of a state has the same reward: 0 in state 0, 1 in the last state; each other state has with
-    probability 0.1 a reward drawn uniformly from 0 to 1, else 0.
+    `seed`: of the draw.  The reward depends only on the state in which an action starts: 0 in state 0, and 1 in the last state.  In each
+    other state it is 0 with probability 0.9, else drawn uniformly from 0 to 1.
     """
     rng = np.random.default_rng(seed)
     outcomes = np.array([[rng.choice(states, branches, replace=False) for _ in range(actions)] for _ in range(states)])

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """True outcomes of the actions of a plant, measured by many tries, and errors of transition models with respect to them.
 
-The outcome of an action depends on the pose within the cell, and on the momentum, with which the part arrived.  Therefore the tries are
-made on a walk through the states, in which each action starts where the last one ended, as for an agent: half of the steps are to a random
-neighbour, half are planned towards actions that need more tries.
+The outcome of an action depends on where in the cell of its first state the part is, and on the momentum that it still has.  Therefore the
+tries are made on a walk through the states, in which each action starts where the last one ended, as for an agent.  Half of the steps are
+to a random neighbour, half are planned towards actions that need more tries.
 """
 
 from __future__ import annotations
@@ -82,10 +82,11 @@ def walk(space: Space, plant_of: Callable[[int], Plant], tries: int, most: int, 
 
 
 def l1(beliefs: OutcomeModel, truth: OutcomeModel) -> Array:
-    """Return the L1 error of the beliefs, the sum of |p - q| over the outcomes of each state-action, (S, A), 0 to 2.
+    """Return the L1 error of a transition model, the sum of |p - q| over the outcomes of each state-action, (S, A), 0 to 2.
 
-    The error is NaN where the truth has no outcome, because there is no action or no try.  The outcomes of the two models may differ in
-    order and number, and several outcomes of a model may stand for the same state: their probabilities are added.
+    `beliefs`: the model.  `truth`: the true outcomes.  The error is NaN for a state-action that does not exist or was never tried.  The
+    outcomes of the two models may differ in order and number, and several outcomes of a model may stand for the same state: their
+    probabilities are added.
     """
     states, actions = truth.outcomes.shape[:2]
     pair = np.arange(states * actions)[:, None]
@@ -107,9 +108,9 @@ def most_likely(truth: OutcomeModel) -> Array:
 
 
 def model_error(beliefs: OutcomeModel, truth: OutcomeModel) -> tuple[float, float]:
-    """Return the mean L1 error of the beliefs over all state-actions, and over the stochastic ones only (NaN if there are none).
+    """Return the mean L1 error of a transition model over all state-actions, and over the stochastic ones only (NaN if there are none).
 
-    A state-action is stochastic if its most likely outcome has a probability below 0.9.
+    `beliefs`: the model.  `truth`: the true outcomes.  A state-action is stochastic if its most likely outcome has a probability below 0.9.
     """
     error = l1(beliefs, truth)
     stochastic = most_likely(truth) < CERTAIN
@@ -119,8 +120,8 @@ def model_error(beliefs: OutcomeModel, truth: OutcomeModel) -> tuple[float, floa
 def sampling_error(truth: Truth) -> Array:
     """Return the expected L1 distance between the measured frequencies and the true distribution, (S, A); NaN without tries.
 
-    It is the sum over the outcomes of the mean absolute deviation of a share p of n tries, sqrt(2 p (1 - p) / (pi n)).  A model's error
-    below this distance cannot be measured.
+    It is the sum of sqrt(2 p (1 - p) / (pi n)) over the outcomes: the mean absolute error of a frequency p that was measured in n tries.
+    An error of a model that is smaller than this distance cannot be measured.
     """
     p = truth.probabilities
     with np.errstate(invalid="ignore", divide="ignore"):

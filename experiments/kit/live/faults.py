@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Schedules of faults of a running system: drawn by a seed, performed on its processes, and shortened as long as the system still fails."""
+"""Schedules of faults of a running system.
+
+A schedule is drawn at random from a seed, and performed on the processes of the system.  If the system fails, a shorter schedule with which
+it still fails is searched.
+"""
 
 from __future__ import annotations
 
@@ -64,7 +68,10 @@ class Fault:
 
 
 def draw(seed: int, services: Sequence[str], seconds: float, period: float) -> list[Fault]:
-    """Draw the schedule of a seed: faults of all KINDS on the given services, within `seconds`, on average one in each `period` seconds."""
+    """Draw a random schedule: faults of the kinds in KINDS on the given services, on average one in each `period` [s], at least one.
+
+    `seed`: of the draw.  `seconds`: all faults begin within this time.
+    """
     rng = np.random.default_rng(seed)
     agents = [name for name in services if name.startswith("agent_")]
     faults = []
@@ -84,10 +91,10 @@ def draw(seed: int, services: Sequence[str], seconds: float, period: float) -> l
 
 
 def draw_around_stop(seed: int) -> list[Fault]:
-    """Draw the schedule of faults of a seed: an emergency stop after 1 s, and two to five other faults, before or after the stop.
+    """Draw a random schedule with an emergency stop after 1 s, and two to five other faults, before or after the stop.
 
-    The launcher, which is also the router, fails only after the stop: without a router no process would receive the stop, and `mobee estop`
-    reports this.
+    `seed`: of the draw.  Faults of the launcher, which is also the router, begin only after the stop.  Without a router no process would
+    receive the stop; this case is not tested here, because `mobee estop` reports it.
     """
     rng = np.random.default_rng(seed)
     faults = [Fault(STOP_AT, "stop")]
@@ -103,7 +110,10 @@ def draw_around_stop(seed: int) -> list[Fault]:
 
 
 def shrunk(schedule: Sequence[Fault], fails: Callable[[Sequence[Fault]], bool], tries: int) -> list[Fault]:
-    """Return a schedule with fewer faults with which the system still fails: halves of the schedule, then single faults are left out.
+    """Return a shorter schedule with which the system still fails.
+
+    Halves of the schedule, then smaller pieces, at last single faults are left out, and stay out if the system still fails without them.
+    If no shorter schedule is found, the whole schedule is returned.
 
     `fails`: performs a schedule and returns whether the system fails.  `tries`: largest number of calls of `fails`.
     """
@@ -130,8 +140,9 @@ class FaultInjector:
     The kinds: kill: the process of a service is killed.  freeze: it is stopped for a time, by a signal.  throttle: it is stopped and
     continued every 50 ms.  disk: it cannot write a byte to a file.  files: it cannot open more than 20 files.  flood: one of
     `floods.FLOODS` is sent.  token: a liveliness token with the name of a service is declared without a process.  duplicate: a second
-    process of a service is started.  stop: an emergency stop is sent.  The kinds in FORGED must not release an emergency stop: false_stop
-    is an EStop message with `set = false`; release and arm are calls in the name of the controller.
+    process of a service is started.  stop: an emergency stop is sent.  The kinds in FORGED test that other clients cannot release an
+    emergency stop.  false_stop: an EStop message with `set = false` is sent.  release, arm: a call is sent whose sender pretends to be the
+    controller.
     """
 
     def __init__(self, session: Any, endpoint: str, launcher: int | None = None, epoch: Callable[[], int | None] = lambda: None) -> None:

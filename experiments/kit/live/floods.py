@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Floods of messages, calls, liveliness tokens and connections, each from its own process: `python -m experiments.kit.live.floods`.
 
-Any program on the machine can send them: the documentation of the bus is sufficient.
+A program needs no secret to send them: any program on the machine can do so that follows the documentation of the bus.
 """
 
 from __future__ import annotations
@@ -119,7 +119,7 @@ FLOODS: dict[str, Callable[[str], None]] = {
 def flood(endpoint: str, name: str) -> Iterator[None]:
     """Send the flood `name`, one of FLOODS, from another process while the body of a `with` statement runs.
 
-    `endpoint`: address of the router.  Raises LaunchFailed at the end if the flood's process has ended before.
+    `endpoint`: address of the router.  Raises LaunchFailed at the end of the statement if the flood's process has already ended.
     """
     process = subprocess.Popen([sys.executable, "-m", "mobee_system.run", "experiments.kit.live.floods", endpoint, name])
     try:

@@ -141,7 +141,10 @@ def write_job(folder: Path, job: Struct) -> None:
 
 
 def read_job(folder: Path, kind: type[T]) -> T:
-    """Return the job of type `kind` that `write_job` wrote into the folder: what a function of an experiment is to do on the live robot."""
+    """Return the job that `write_job` wrote into the folder, as an object of the type `kind`.
+
+    A job states what a function of an experiment is to do on the live robot.
+    """
     return decoded((folder / JOB).read_text(), kind)
 
 
@@ -221,8 +224,8 @@ def launch(
         speed: share of the motors' largest speed.
         seconds: robot time after which the system ends at the latest.
         lockstep: whether the ticks wait for all services; False: real time.
-        simulator: further settings of robot_sim: text, numbers and dicts of these.  The default of "backend" is "pybullet", that of "world"
-            is `world`.
+        simulator: further settings of robot_sim by name; a value is text, a number or a dict of such values.  The default
+            of "backend" is "pybullet", that of "world" is `world`.
     """
     folder.mkdir(parents=True, exist_ok=True)
     mode = f'mode = "lock"\npatience = {TICK_TIMEOUT:g}' if lockstep else ""

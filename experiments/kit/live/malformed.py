@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Draws messages, requests and tokens of the bus that are nearly valid: right keys, types, fields and lengths, and values of all kinds.
+"""Draws random messages, requests and tokens of the bus that are nearly valid.
 
-Most values are valid, and are taken from the running system.  Some are at or beyond a bound, of another type, left out, or added.  In a few
-messages, bytes are changed.  `python -m experiments.kit.live.malformed` sends them.
+Keys and fields are those of the bus.  Most values are valid; run, tick and time are mostly those of the running system, or near.  Some
+values are extreme, odd or of a wrong length.  In some messages a field is left out, added or of another type.  In some the bytes are
+truncated, or one byte is changed.  `python -m experiments.kit.live.malformed` sends them.
 """
 
 from __future__ import annotations
@@ -110,7 +111,7 @@ class Drawer:
         return self._drawn(key, cls, self._parts[part], call=True, valid=verb not in ENDS)
 
     def token(self) -> str:
-        """Draw the key of a liveliness token, of a service, the router or an unknown process."""
+        """Draw the key of a liveliness token that names a service, the router or an unknown process."""
         who = self._random.choice((*SERVICES, "router", "stranger"))
         return keys.alive(who, f"i{self._random.randrange(INSTANCES)}")
 

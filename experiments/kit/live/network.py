@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Two hosts on one machine: network namespaces, joined by a wire whose faults a test sets.  No packet leaves the machine."""
+"""Two hosts on one machine: two network namespaces, joined by a wire.  A test sets the wire's faults.  No packet leaves the machine."""
 
 from __future__ import annotations
 
@@ -46,7 +46,8 @@ def refused() -> str:
 class Network:
     """Two hosts and the wire between them: the network namespace of this process is the first host, a new namespace the second.
 
-    A `with` statement makes and removes the second host and the wire.  The process must run in its own namespace, as by `inside`.
+    A `with` statement makes and removes the second host and the wire.  The process must run in a network namespace of its own: start it by
+    the command that `inside` returns.
     """
 
     def __init__(self, seed: int) -> None:
@@ -80,7 +81,10 @@ class Network:
         self._wire.stdin.flush()
 
     def plug(self, up: bool) -> None:
-        """Set the network interface of the second host up or down; unlike a cut of the wire, its programs notice this at once."""
+        """Set the network interface of the second host up or down.
+
+        The programs of this host notice this at once.  They do not notice a cut of the wire at once.
+        """
         _run(self.on_second(["ip", "link", "set", "mobee0", "up" if up else "down"]))
 
     def on_first(self, argv: Sequence[str]) -> list[str]:

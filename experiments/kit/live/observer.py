@@ -30,9 +30,9 @@ class Moment:
     """The state of a part at one tick.
 
     `run`, `k`: identifier of the run, and number of the tick in it.  `t`: s, simulated time of the bus.  `at`: s, monotonic time of the
-    machine.  `gate`: state of the gate, the last check of commands before the motors, as "armed".  `mode`: kind of the command in force, as
-    "hold".  `age`: age of this command, in ticks.  `q`: measured positions of the part's motors, rad.  `speed`: rad/s, of the fastest
-    motor.
+    machine.  `gate`: state of the gate, the last check of commands before the motors, as "armed".  `mode`: kind of the command that the
+    part follows, as "hold".  `age`: number of ticks since the tick that this command answers; -1: no command.  `q`: measured positions of
+    the part's motors, rad.  `speed`: rad/s, of the fastest motor.
     """
 
     run: str
@@ -53,9 +53,9 @@ class Observer:
     Attributes:
         parts: states by part, in order of arrival.
         ticks: monotonic time [s] at which a tick began, by run and number.
-        motions: changes of a part's motion, by part: time of arrival [s], status, action.
-        published: state, action, state reached, settled, duration, by agent and number of the transition.
-        conflicts: a line for each number under which an agent published two different transitions.
+        motions: by part, a row (time of arrival [s], status, name of the action) for each change of its status or action.
+        published: (state, action, state reached, settled, duration) of each transition, by (agent, number of the transition).
+        conflicts: a line of text for each transition whose agent had published another one with the same number.
         locked: whether the robot runs in lockstep (every tick waits for all participants).
         lock: held while the other fields change.
     """
@@ -130,9 +130,10 @@ class Observer:
     def take(self) -> tuple[dict[str, list[Moment]], list[float]]:
         """Return a dict from the part to its states so far, and the ages [s] of the commands obeyed; keep only the last state of each part.
 
-        The age of a command is the time from the beginning of the tick that it answers to the beginning of the tick in which the robot
-        obeyed it.  The returned age is a lower bound: it ends one tick earlier.  The reason is that a tick is published after the gate has
-        judged its command, and that a busy machine may take long between the two.  States whose ticks were not received have no age.
+        If a command answers tick m, and the robot obeys it in tick k, then its age is the time between the beginnings of ticks m and k.
+        The returned age is a lower bound: it ends at the beginning of tick k - 1.  It does not end at tick k, because this tick is
+        published only after the gate has checked the command, and a busy machine may take long between the two.  A command has no age if
+        tick m or tick k - 1 was not received.
         """
         with self.lock:
             taken, self.parts = self.parts, {part: states[-1:] for part, states in self.parts.items()}
@@ -144,10 +145,11 @@ class Observer:
 
 @dataclass(frozen=True)
 class Stop:
-    """How a part came to rest after a fault; a number is None if this did not happen within the given time.
+    """How a part came to rest after a fault.
 
-    `hold`, `rest`: s from the fault until the gate held the part, and until it was at rest.  `distance`: rad, largest motion of a motor
-    until then.
+    `hold`: time [s] from the fault until the gate held the part; None if it was not held.  `rest`: time [s] from the fault until the held
+    part was at rest (all motors below 2 deg/s).  `distance`: largest displacement of a motor [rad] between the fault and rest.  Both are
+    None if the part did not come to rest in the observed time.
     """
 
     hold: float | None
@@ -156,7 +158,7 @@ class Stop:
 
 
 def stop_after(states: list[Moment], fault: float, until: float) -> Stop | None:
-    """Return how a part stopped after a fault; None if it was not moving by a command at that time.
+    """Return how a part stopped after a fault; None if, when the fault began, the part was not moving under a command.
 
     `states`: states of the part, in order of time.  `fault`, `until`: monotonic times [s] of the fault and of the end of the observation.
     """
@@ -189,10 +191,11 @@ def survived(changes: list[tuple[float, str, str]], fault: float, until: float) 
 
 
 def violations(states: Mapping[str, list[Moment]], robot: Robot, noise: float) -> list[str]:
-    """Return a line of text for each broken guarantee of the system in the states that were recorded under one schedule of faults.
+    """Check guarantees of the system in recorded states, and return a line of text for each violation.
 
-    The guarantees: within a run time never decreases, and no motor is faster than the safety gate of robot_sim allows.  In lockstep, tick 0
-    may be repeated until all services have answered.  `states`: by part.  `noise`: largest error of the encoders, rad.
+    The guarantees: within a run the tick number increases, and no motor is faster than the safety gate of robot_sim allows.  A repeated
+    tick 0 is no violation: in lockstep it is repeated until all services have answered.  `states`: states of each part, in order of
+    arrival, from one schedule of faults.  `noise`: largest error of the encoders, rad.
     """
     found = []
     for part, moments in states.items():
@@ -210,9 +213,9 @@ def violations(states: Mapping[str, list[Moment]], robot: Robot, noise: float) -
 
 
 def too_old(ages: Sequence[float]) -> list[str]:
-    """Return one line of text if a command was obeyed more than OLDEST (0.1 s) after the tick that it answers, else [].
+    """Return [a line of text] if the age of a command is above OLDEST (0.1 s), else [].
 
-    `ages`: ages of the commands [s], as `Observer.take` returns them.
+    `ages`: the time from the tick that a command answers until the robot obeyed it [s], as `Observer.take` returns it.
     """
     oldest = max(ages, default=0.0)
     return [f"a command was obeyed {1e3 * oldest:.0f} ms after the tick that it answers began"] if oldest > OLDEST else []
@@ -223,8 +226,7 @@ class Kept:
     """Counts of the transitions of agents in a store on disk, compared with the published ones.
 
     `kept`: on disk.  `lost`: published, but not on disk.  `differing`: on disk with other values than published, or published twice with
-    different values.  `gaps`: transitions on disk with a number that another one has, too; a missing number raises MobeeError when the
-    store is read.
+    different values.  `gaps`: transitions on disk with the same number as another one of the agent.
     """
 
     kept: int

@@ -74,7 +74,7 @@ def running(folder: Path, scenario: str) -> Iterator[System]:
 def wait_for(condition: Callable[[], Any], timeout: float, what: str, period: float = 0.01) -> Any:
     """Call `condition` every `period` s until it returns a true value, and return this value; raises LaunchFailed after `timeout` s.
 
-    `what`: text for the message, what was expected.
+    `what`: what was expected, as text for the error message.
     """
     give_up = time.monotonic() + timeout
     while not (value := condition()):

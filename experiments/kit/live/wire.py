@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A wire between two network interfaces, with faults drawn by a seed: delay, loss, reordering, and a cut that nothing reports.
+"""A wire between two network interfaces, with random faults: delay, loss, reordering, and a cut, of which no program is notified.
 
-The kernel's own emulator (netem) has no seed before Linux 6.6 and is missing from many kernels; TUN interfaces are present there.
+The wire uses TUN interfaces.  The kernel's own emulator (netem) has no seed before Linux 6.6, and many kernels do not contain it.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Wire:
     """Carries packets between two TUN interfaces.
 
     Attributes:
-        faults: what happens to packets that are taken from now on.
+        faults: what happens to packets that `take` reads after this attribute was set.
         carried: number of packets that were not lost.
         lost: number of lost packets.
     """

@@ -79,8 +79,8 @@ def reach_plant(seed: int, law: str = "published") -> OfflinePlant:
 def learned_beliefs(plant: OfflinePlant, seed: int, transitions: int = TRANSITIONS) -> OutcomeModel:
     """Return the transition model that a curious agent learns on the plant without a target.
 
-    Learning to reach does not change this model (thesis 8.1).  `seed`: seed of the agent and its start.  `transitions`: number of
-    transitions that the agent makes.
+    Learning to reach does not change this model (thesis 8.1).  `seed`: seed of the agent and of the random state to which the arm moves
+    first.  `transitions`: number of transitions that the agent makes.
     """
     space = reach_space()
     begin_anywhere(space, plant, seed)
@@ -102,7 +102,8 @@ def body(law: str = "default") -> Robot:
 def space(law: str = "default") -> Lattice:
     """Return the 81 states of the right arm's four joints with actions from each state to the 16 nearest ones.
 
-    `law`: "default" with today's robot, or "published" with the robot of 2014.  Every call returns the same object.
+    `law`: name of the control law, which selects the robot: "default": today's robot; "published": the robot of 2014.  Every call with the
+    same law returns the same object.
     """
     return Lattice(body(law), RIGHT, RANK3, ARM_NEIGHBOURS)
 
@@ -201,7 +202,9 @@ class Errors:
 
 
 class JudgedPlant(WrappedPlant[OfflinePlant]):
-    """An offline plant with errors of its encoders and eyes: control uses their readings, but reaches are judged in the true poses.
+    """An offline plant with calibration errors of encoders and eyes.
+
+    Actions and reaches use the wrong readings.  But the outcome of a reach has the true position of the marker and the true error.
 
     Args:
         plant: the plant that moves.
@@ -225,21 +228,24 @@ class JudgedPlant(WrappedPlant[OfflinePlant]):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The settings of the inner plant and the calibration errors, as JSON values (`mobee.plant.Described.settings`)."""
+        """The settings of the plant that moves, the calibration errors and the unseen objects, as JSON values.
+
+        See `mobee.plant.Described.settings`.
+        """
         errors = {"turns": self.errors.turns.tolist(), "shift": self.errors.shift.tolist()}
         return self.inner.settings | {"errors": errors, "unseen": sorted(self._unseen)}
 
     def act(self, part: str, target: Array) -> Outcome:
-        """Perform the action on the inner plant, as in `mobee.plant.Plant.act`; the outcome has no contacts with unseen objects.
+        """Perform the action, as in `mobee.plant.Plant.act`; the contacts in the outcome do not include those with unseen objects.
 
         `part`, `target`: as in that method.
         """
         return self._reported(super().act(part, target))
 
     def go(self, part: str, target: Array, marker: str) -> Outcome:
-        """Perform an action, as `act` does, but without a force of the target on the marker's hand.
+        """Perform an action, as `act` does, but the target exerts no force on the hand that has the marker.
 
-        For planners, which keep the hand away from the target by their plans.
+        The method is for planners: their plans decide where the hand keeps away from the target, and where it touches the target.
         """
         return self._reported(self.inner.act(part, target, reaching=marker))
 
@@ -260,9 +266,10 @@ class JudgedPlant(WrappedPlant[OfflinePlant]):
         )
 
     def missing(self, marker: str) -> float:
-        """Return the true remaining error of the marker now, m: its distance from the centre or surface of the target, at which it aims.
+        """Return the true distance of the marker from the target now, m.
 
-        Raises InvalidValue if no target is presented.
+        It is measured from the target's centre, or from its surface if the target's `aim` is "surface" (0 inside the target).  Raises
+        InvalidValue if no target is presented.
         """
         return self._true.missing(self.marker_at(marker))
 

@@ -134,10 +134,11 @@ class PeerBelief:
         return touching
 
     def push(self, q: Array) -> Array:
-        """Return how strongly the fields push the planned motors in each pose q (P, d) rad, (P,), in m^2/rad.
+        """Return how strongly the fields push the planned motors in each pose: (P,) m^2/rad.
 
-        Fields are volumes around robot parts and objects that cause repulsive forces.  The result is the norm of the sum of J^T (depth *
-        normal) over the contacts of fields; the target does not push the hand.
+        `q`: (P, d) rad, encoder readings of the planned motors, one row for each pose.  Fields are volumes around robot parts and objects
+        that cause repulsive forces.  The result is the norm of the sum of J^T (depth * normal) over the contacts of fields; the target does
+        not push the hand.
         """
         size: Array = np.linalg.norm(self._evaluate(self.whole(q), reaching=True).projection[:, self.columns], axis=1)
         return size
@@ -171,8 +172,8 @@ def goals(
 
     `PeerBelief` defines "sound".  From the pose away from the target the hand moves straight to the target.  The poses are sorted by the
     forces of the fields (volumes that repel), the smallest first.  `rng`: for the random starts of the search.  `most`: largest number of
-    poses. `free`: True: return only poses in which no joint limit exerts a force; False: return other poses, too, if there are no such
-    poses.
+    poses. `free`: True: return only poses in which no joint limit exerts a force; False: if none of these is found, return poses in which
+    joint limits exert forces.
     """
     within = target.radius if target.aim == "surface" else 0.0
     trials = ((belief.limits, ARRIVED), (belief.range, ARRIVED), (belief.range, ALMOST))
@@ -219,11 +220,12 @@ def approach(belief: PeerBelief, starts: Array, place: Array, within: float, lim
 
 
 def retreat(belief: PeerBelief, pose: Array, place: Array) -> Array | None:
-    """Return the first pose (d,) rad on the marker's straight path out of the target that is free of contacts; None if there is none.
+    """Move the marker away from the target in steps, and return the first pose (d,) rad that is free of contacts; None if there is none.
 
-    `pose`: (d,) rad, with the marker on the target.  `place`: (3,) m, root frame, centre of the target.  In the returned pose nothing
-    touches, neither solids nor repulsive fields, except the hand's fields with the target.  If there is no such pose within 0.2 m, the
-    first pose in which no solids touch is returned.
+    The marker moves straight, in the direction from the target's centre to its position in `pose`, by up to 0.2 m.  `pose`: (d,) rad, with
+    the marker on the target.  `place`: (3,) m, root frame, centre of the target.  In the returned pose no solids and no repulsive fields
+    have contact; only the hand's fields may overlap the target.  If no such pose is found, the first pose without contacts of solids is
+    returned.
     """
     whole = belief.whole(pose)
     here = belief.model.evaluate(whole).position(belief.marker)

@@ -76,7 +76,8 @@ def make_cases(scene: str, count: int, seed: int, law: str = "default", free: bo
 
     The targets are drawn from those of `touchable_targets`.  In a start pose no solid touches anything.  `scene`: "free", "around",
     "against", "between" or "moving", as explained at SCENES.  `seed`: seed of the draws.  `law`: "default" with today's robot, or
-    "published" with the robot of 2014.  `free`: the palm can touch each target in a pose in which no joint limit exerts a force.
+    "published" with the robot of 2014.  `free`: True: only targets that the palm can touch in a pose in which no joint limit exerts a
+    force; False: joint limits may exert forces in this pose.
     """
     rng = np.random.default_rng([seed, 87, SCENES.index(scene)])
     targets, belief = touchable_targets(law, free), arm_belief(law=law)
@@ -156,9 +157,9 @@ REACHES = {"published": 1, "default": 3}  # per case; the thesis reached once
 class Attempt:
     """The result of one attempt to bring the palm to a target.
 
-    `missing`: distance of the palm from the target's surface at the end [m].  `seconds`: duration in time of the plant [s].  `thinking`:
-    processor time for plans [s]. `reward`: thesis eq. 8.4, of the distance from the point at which the control law aims (centre or
-    surface).
+    `missing`: distance of the palm from the target's surface at the end [m].  `seconds`: duration by the plant's clock [s].  `thinking`:
+    processor time for plans [s]. `reward`: reward of the attempt (thesis eq. 8.4), computed from the palm's distance to the target's
+    centre, or to its surface if the target's `aim` is "surface".
     """
 
     missing: float
@@ -172,7 +173,8 @@ def trained(seed: int, transitions: int, tries: int, law: str = "default", free:
 
     `seed`: seed of the plant and the agent.  `transitions`: number of transitions that the agent learns before it tries to reach.  `tries`:
     number of problem-tries, each one an attempt to reach one target.  `law`: "default" with today's robot, or "published" with the robot of
-    2014.  `free`: the palm can touch each target in a pose in which no joint limit exerts a force.
+    2014.  `free`: True: only targets that the palm can touch in a pose in which no joint limit exerts a force; False: joint limits may
+    exert forces in this pose.
     """
     plant = arm_plant(seed + 500, law=law)
     agent = reach_agent(plant, learned_transitions(plant, seed, transitions, law), seed, law)
@@ -181,12 +183,13 @@ def trained(seed: int, transitions: int, tries: int, law: str = "default", free:
 
 
 def attempt(method: str, agent: ReachAgent, case: Case, seed: int, motors: MotorParameters | None = None, law: str = "default") -> Attempt:
-    """Attempt a case from rest in its start pose, and return the result.
+    """Try to bring the palm to the target of a case, and return the result; at first the arm is at rest in the start pose.
 
     `method`: "planner": move to a state with the palm near the target, without a reach; "reach": reach from the start pose; "both": move to
     the state with the highest expected reward of reaching, then reach.  In a reach, a force pulls the palm to the target.  A reach that
     misses is repeated, up to REACHES times in all (1 for the control law "published", 3 for "default"). `agent`: the trained learner.
-    `seed`: seed of the plant and of choices.  `motors`: motor parameters; None: the default ones.  `law`: "default" or "published".
+    `seed`: seed of the plant, and of choices among equally good actions.  `motors`: motor parameters; None: the default ones.  `law`:
+    "default" or "published".
     """
     plant = begun(case, seed, motors, law)
     start = plant.time

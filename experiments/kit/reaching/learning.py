@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Learning to reach in experiments: learners by name, learning with evaluations, and single tries by plans."""
+"""Learning to reach in experiments: learners by name, learning with evaluations, and single tries to reach a target without learning."""
 
 from __future__ import annotations
 
@@ -68,13 +68,14 @@ def learn(
     repetitions: int,
     sets: Mapping[str, Sequence[ReachTarget]],
 ) -> dict[str, Any]:
-    """Let an agent learn from `problems`, and evaluate it on each of the named `sets` after each number of tries in `checkpoints`.
+    """Let an agent learn from `problems`, and evaluate it on each of the named `sets` at every checkpoint.
 
-    Returns arrays by name.  A problem-try is one attempt to reach one target.  For each of the T problem-tries, (T,): `problem`: index of
-    the target in `problems`; `reach_state`: state from which the agent reached, -1 if it did not; `reward`; `actions`: number of actions;
-    `duration` [s].  `failures` (S, A): number of failures of each transition.  For each set NAME, with L evaluations of R = `repetitions`
-    repetitions of P problems: `rewards_NAME` (L, R, P): rewards of the reaches, 0 without a reach; `states_NAME` (L, R, P): states from
-    which the agent reached, -1 without a reach; `blocked_NAME` (L,): number of failed transitions.
+    `checkpoints`: (L,) numbers of problem-tries after which the agent is evaluated, ascending.  A problem-try is one attempt to reach one
+    target.  `repetitions`: R, how often an evaluation attempts each target of a set.  Returns arrays by name.  For each of the T
+    problem-tries, (T,): `problem`: index of the target in `problems`; `reach_state`: state from which the agent reached, -1 if it did not;
+    `reward`; `actions`: number of actions; `duration` [s].  `failures` (S, A): number of failures of each transition.  For each set NAME of
+    P targets: `rewards_NAME` (L, R, P): rewards of the reaches, 0 without a reach; `states_NAME` (L, R, P): states from which the agent
+    reached, -1 without a reach; `blocked_NAME` (L,): number of failed transitions.
     """
     tries: list[Try] = []
     found: dict[str, list[Evaluation]] = {name: [] for name in sets}
@@ -125,10 +126,10 @@ def _of_tries(tries: Sequence[Try], shape: tuple[int, ...]) -> dict[str, Any]:
 
 
 class Course:
-    """One try to reach a target by plans, as in an evaluation (thesis 8.3.3), on any plant; the target may move.  The agent learns nothing.
+    """One try to reach a target, as in an evaluation (thesis 8.3.3), on any plant.  The target may move; the agent learns nothing.
 
-    The part moves to the state with the highest expected reward of reaching.  Within the try, it avoids transitions that failed, and states
-    from which reaches missed.
+    A new plan is made before every action.  The part moves to the state with the highest expected reward of reaching.  Within the try, it
+    avoids transitions that failed, and states from which reaches missed.
 
     Args:
         plant: the robot.
@@ -136,8 +137,8 @@ class Course:
         worth: function that returns the expected reward (S,) of reaching for a target (3,) m from each state.
         where: function that returns the present position of the target, (3,) m, root frame.
         rng: for the choice among equally good actions.
-        apart: after a missed reach, states within this distance of the state of the reach are avoided, too.  The distance of two states is
-            the sum over the motors of the differences, each as a share of the motor's range.
+        apart: after a missed reach, the state from which it was made is avoided, and all states within this distance of it.  The distance
+            of two states is the sum over the motors of the absolute differences, each as a share of the motor's range.
     """
 
     def __init__(
@@ -160,7 +161,10 @@ class Course:
         """Processor time spent on plans so far, s."""
 
     def go(self) -> None:
-        """Follow the plan, which is renewed after each transition, until its next action is to reach, or for at most 9 transitions."""
+        """Make transitions until the plan says to reach, but at most 9; a new plan is made before each transition.
+
+        The reach itself is not made.
+        """
         space = self._agent.space
         self._state = space.state_of(self._plant.measure(space.part))
         for _ in range(MAX_ACTIONS - 1):

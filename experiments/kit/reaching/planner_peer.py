@@ -2,9 +2,9 @@
 """The planner with which reach learners are compared: inverse kinematics and RRT-Connect, executed through MoBeE.
 
 The planner has a belief about robot and world (`kit.reaching.belief`), which may differ from the plant, and it plans again after every
-change.  If a motion does not end as planned, the planner avoids that pose and plans again from where the arm is.  A planner with a memory
-avoids the pose in later tries, too.  If the target was touched there, it avoids the pose only for this target, else for all targets, as
-thesis 9.4.1 distinguishes workspace and body.
+change.  If a motion does not end as planned, the planner plans again from the present pose of the arm, and avoids a pose near the end of
+the motion.  A planner with a memory avoids this pose in later tries, too.  If the target was touched at the end of the motion, the pose is
+avoided only for this target, else for all targets, as thesis 9.4.1 distinguishes workspace and body.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class PeerMemory:
         self.restore(([], {}))
 
     def blocked(self, aim: Array, end: Array, target: ReachTarget, touched: bool) -> None:
-        """Record that a motion to the pose `aim` ended in another pose `end`, both (d,) rad, and avoid a pose near its end.
+        """Record that a motion to the pose `aim` ended in another pose `end`, both (d,) rad; a pose near `end` is avoided from now on.
 
         The avoided pose lies on the line from `end` to `aim`, at the distance 0.08 from `end` in units of the motors' ranges; or it is
         `aim` if that is nearer.  `touched`: whether the target was touched; the pose is then avoided only for this target.
@@ -100,9 +100,9 @@ class PeerPlans:
     def path(self, target: ReachTarget, here: Array, memory: PeerMemory) -> tuple[Array, Array] | None:
         """Return a path from the pose `here` (d,) rad to a target: its corners (k, d) rad, and the pose (d,) rad at the target.
 
-        The last corner is the pose before the target, from which the hand moves straight to it.  If the poses that `memory` avoids leave no
-        path, new goal poses are drawn.  If there is still no path, avoided poses are ignored: first those that are avoided for all targets,
-        then the others.  Returns None if there is no path even then.
+        At the last corner the hand is still away from the target; from there it moves straight to the target.  If the poses that `memory`
+        avoids leave no path, new goal poses are drawn.  If there is still no path, avoided poses are ignored: first those that are avoided
+        for all targets, then the others.  Returns None if there is no path even then.
         """
         belief = self._belief
         belief.present(target)
@@ -170,11 +170,11 @@ ENDS: tuple[Ended, ...] = ("there", "used up", "no plan")
 class PeerTry:
     """The result of one attempt of the planner to bring the marker to a target.
 
-    `missing`: true distance of the marker from the centre or surface of the target, at which it aims [m], after the last motion to a pose
-    at the target; at the end, if there was no such motion.  `ended`: "there": the planner believes the marker at the target; "no plan": it
-    found no path; "used up": it made the largest number of actions, because motions were blocked or the target moved.  `actions`: number of
-    motions.  `plans`: number of searches for a path.  `seconds`: duration in time of the plant [s].  `planning`: processor time of the
-    searches [s].  `checked`: number of poses checked for contacts.
+    `missing`: true distance of the marker from the target [m], as `PeerPlant.missing` returns it.  It is measured after the last motion to
+    a pose at the target.  If there was no such motion, it is measured at the end of the attempt.  `ended`: "there": the planner believes
+    the marker at the target; "no plan": it found no path; "used up": it made the largest number of actions, because motions were blocked or
+    the target moved.  `actions`: number of motions.  `plans`: number of searches for a path.  `seconds`: duration in time of the plant [s].
+    `planning`: processor time of the searches [s].  `checked`: number of poses checked for contacts.
     """
 
     missing: float
@@ -215,7 +215,10 @@ class PeerPlant(Protocol):
         ...
 
     def missing(self, marker: str) -> float:
-        """Return the true distance of the marker now from the centre or surface of the target, at which it aims [m]."""
+        """Return the true distance of the marker from the target now [m].
+
+        It is measured from the target's centre, or from its surface if the target's `aim` is "surface" (0 inside the target).
+        """
         ...
 
 
@@ -257,9 +260,12 @@ class PlannerPeer:
         self._known.restore(knowledge)
 
     def try_problem(self, target: ReachTarget, sees: Callable[[], ReachTarget] | None = None) -> PeerTry:
-        """Present a target, move the marker to it, and move back to the pose before the target; returns the result.
+        """Present a target, move the marker to it, and then away from it again; returns the result.
 
-        `sees`: function that returns the target as it is seen now; it is called before each action.  None: the target does not move.
+        After each motion to a pose at the target, the arm returns to the last waypoint of the path, at which the hand is away from it.
+
+        `sees`: function that returns the target as it is seen now.  It is called before each plan, before each motion to a waypoint, and
+        after each motion to a pose at the target.  None: the target does not move.
         """
         if self._memory == "none":
             self._known.clear()

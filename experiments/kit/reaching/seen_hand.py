@@ -34,8 +34,8 @@ class Judge(ReachPlant, Protocol):
 class SeenHand:
     """What a learner knows by seeing its hand.
 
-    `offsets`: the estimated errors of the encoders of some motors, which are kept when the world changes.  `is_seen`: whether the hand is
-    seen at present.
+    `offsets`: estimates the errors of the encoders of some motors.  All plants that `correct` returns share it, so the estimates are kept
+    when a learner gets a new plant.  `is_seen`: whether the hand is seen at present.
     """
 
     def __init__(self, robot: Robot, motors: Sequence[str], seed: int) -> None:
@@ -49,14 +49,17 @@ class SeenHand:
         return judge.marker_at(MARKER) + error if self.is_seen else None
 
     def correct(self, judge: Judge) -> JudgedSeeingPlant:
-        """Return a plant that acts through the plant `judge`, and corrects the encoders by the positions at which the hand is seen."""
+        """Return a plant that moves `judge`, but has corrected encoder values.
+
+        The corrections are estimated from the positions at which the hand is seen.  `judge`: the plant with wrong encoders.
+        """
         return JudgedSeeingPlant(SelfCalibratingPlant(judge, self.offsets, lambda: self.see(judge)), judge)
 
 
 class JudgedSeeingPlant(WrappedPlant[SelfCalibratingPlant]):
-    """A self-calibrating plant whose reaches are judged by the true position of the hand, as those of other learners are.
+    """A self-calibrating plant whose outcomes of reaches have the true position of the hand and the true remaining error.
 
-    `inner`: the self-calibrating plant.  `judge`: the plant through which it acts, which knows the true position.
+    `inner`: the self-calibrating plant.  `judge`: the plant that `inner` moves; it knows the true position of the hand.
     """
 
     def __init__(self, inner: SelfCalibratingPlant, judge: Judge) -> None:
@@ -64,9 +67,9 @@ class JudgedSeeingPlant(WrappedPlant[SelfCalibratingPlant]):
         self._judge, self._target = judge, ReachTarget(np.zeros(3))
 
     def present(self, target: ReachTarget | None) -> None:
-        """Present a target to the plant inside, or remove it (None); as in `mobee.reach.ReachPlant.present`.
+        """Present a target to the self-calibrating plant, or remove it (None); as in `mobee.reach.ReachPlant.present`.
 
-        The last target is kept to judge the reach.
+        The last target is kept, also after None: the true error of a reach is computed from it.
         """
         self._target = target or self._target
         super().present(target)

@@ -5,9 +5,9 @@
 
 prints which of them inverse kinematics can reach; the table is in README.md of this folder.
 
-The figure gives no coordinates.  The original's program draws targets from x -0.4 to -0.1, y 0 to 0.4 and z 0 to 0.4 m in steps of 0.1, in
-the root frame: x is negative in front of the robot, y positive to its right, z positive upwards.  The grid here has every second of these
-values of y and z, and all values of x except the farthest, which only the stretched arm reaches.
+The figure gives no coordinates.  In the original's program, targets have x from -0.4 to -0.1, y from 0 to 0.4 and z from 0 to 0.4 m, in
+steps of 0.1, in the root frame: x is negative in front of the robot, y positive to its right, z positive upwards.  The grid here has every
+second of these values of y and z, and all values of x except the farthest, which only the stretched arm reaches.
 """
 
 from __future__ import annotations
@@ -125,7 +125,10 @@ AT_CENTRE = 2e-3  # m within which the palm counts as at the centre
 
 
 def joints_of(count: int) -> tuple[str, ...]:
-    """Return the names of the first `count` motors of the right arm: 4 are those of the lattice, 7 are all but those of the hand."""
+    """Return the names of the first `count` motors of the right arm.
+
+    4: shoulder and elbow, with which the reach learners move (`kit.reaching.arm.reach_space`); 7: these and the wrist, without the hand.
+    """
     return robot().parts[PART].motors[:count]
 
 
@@ -151,8 +154,9 @@ def touchable_targets(law: str = "default", free: bool = True) -> tuple[ReachTar
     """Return 27 targets that the right palm can touch in an empty world; every call returns the same object.
 
     These are the thesis' targets that the palm can touch, and random targets within the same box in place of the others.  The palm touches
-    a target in a pose in which only the hand's solid is in the target, and cable constraints hold.  `law`: "default" with today's robot, or
-    "published" with the robot of 2014.  `free`: in this pose no joint limit exerts a force.
+    a target in a pose in which the cable constraints hold, and no solids have contact, except those of the hand with the target.  `law`:
+    "default" with today's robot, or "published" with the robot of 2014.  `free`: True: such a pose must exist in which no joint limit
+    exerts a force; False: joint limits may exert forces in it.
     """
     belief, rng, places, aim = arm_belief(law=law), np.random.default_rng(27), grid(), laws()[law].aim
     found = [target for target in targets_at(places, aim) if touchable(belief, target, free)]
@@ -173,7 +177,10 @@ def touchable(belief: PeerBelief, target: ReachTarget, free: bool = True) -> boo
 
 
 def table() -> str:
-    """Return a Markdown table of the distances of all targets, and one that counts the targets that can be reached."""
+    """Return two Markdown tables, for 4 and for 7 joints of the right arm.
+
+    The first has the numbers of targets that can be reached, the second the least distance [cm] of the palm from each of the 27 targets.
+    """
     lines = ["| joints | targets | palm at the centre | palm within 2 cm of the surface |", "| --- | --- | --- | --- |"]
     each = {}
     for count in (len(RIGHT), 7):

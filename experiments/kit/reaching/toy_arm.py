@@ -7,10 +7,11 @@ The arm has two links on a shoulder of three joints, with the ranges of the iCub
 squares, by at most half a radian per joint; its start pose is noisy.  Targets are balls, and most actions whose path passes through the
 target fail.
 
-The command prints a table by predictor and strategy.  Each row has three kinds of numbers.  First the rewards of an evaluation on the 27
-targets, after each number of problem-tries (attempts to reach one target), as a fraction of the rewards of an oracle, an agent that knows
-the true rewards.  Then the same fraction on eight targets between them that are never tried, after 800 problem-tries.  Last the learning
-time [s].
+The command prints a table with a row for each learner: its predictor, strategy and memory of failures.  All numbers are means over the
+seeds.  The columns 50 to 1600 have the rewards on the 27 targets, divided by those of an oracle, an agent that knows the true rewards.  The
+heading is the number of attempts to reach one target after which the learner is evaluated.  The column "new" has the same fraction for
+eight other targets, the centres of the cells of the grid of 27.  The learner never tries them; it is evaluated on them after 800 attempts.
+The column "s" has the run time per seed [s].
 """
 
 from __future__ import annotations
@@ -179,7 +180,10 @@ class Truth:
 
 
 def toy_agent(arm: ToyArm, seed: int, predictor: Any, strategy: str, failures: str) -> ReachAgent:
-    """Return a `ReachAgent` on a toy arm; `predictor`, `strategy` and `failures` are its arguments of these names."""
+    """Return a `ReachAgent` that moves the toy arm `arm`.
+
+    `seed`: seed of the agent.  `predictor`, `strategy`, `failures`: passed to `ReachAgent` as its arguments with the same names.
+    """
     kind = Learner(predictor, strategy, failures)
     return kind.agent(arm.space, arm, arm, marker=MARKER, seed=seed, hands=arm.hands, jacobians=arm.jacobians)
 
@@ -211,7 +215,7 @@ def true_rewards(target: Array) -> Array:
 
 
 def blocked(target: Array) -> NDArray[np.bool_]:
-    """Return which actions a target at (3,) m, relative to the shoulder, blocks, (S, A)."""
+    """Return which actions are blocked by a target, (S, A); `target`: (3,) m, its position relative to the shoulder."""
     space = toy_space()
     found: NDArray[np.bool_] = swept(space.samples, space.samples[space.goals], target, CLEARANCE) & (space.goals >= 0)
     return found

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""True rewards of reaches and transitions blocked by targets, measured on the plant, and the oracle that plans with them.
+"""The true rewards of reaches, and the transitions that targets block, both measured on the plant; and the oracle that plans with them.
 
-Every reach and every transition is tried several times on the offline plant, each from where the last action ended.  If a try with the
-target in place ends in a state that needs more tries, these are made next; all other states are entered without the target.
+Every reach and every transition is tried several times on the offline plant.  Each try starts where the last action ended.  The target
+stays in the world as long as the arm is in a state with remaining tries.  Otherwise the target is removed, the arm moves to a state with
+remaining tries, and the target is put back.
 
 The oracle is an agent that plans and is evaluated like the learners, with the same discount, model of free transitions and limit of
 actions.  But it knows the mean rewards and the blocked transitions.  Its score is an upper bound for learners.  A learner can exceed it by
@@ -39,8 +40,8 @@ BLOCKED = 0.5  # share of failed tries from which a transition counts as blocked
 class Tried:
     """Results of trying every reach and every transition with one target in the world.
 
-    `missing`: (S, n) m, remaining errors of n tries to reach from each state; NaN for tries that were not made.  `made`, `failed`: (S, A),
-    number of tries of each transition, and of those that did not end in its goal.
+    `missing`: (S, n) m, remaining errors of n tries to reach from each state; NaN for tries that were not made.  `made`: (S, A), number of
+    tries of each transition.  `failed`: (S, A), number of these tries that did not end in the goal of the transition.
     """
 
     missing: Array
@@ -67,7 +68,7 @@ class Truth:
     def rewards(self, scale: float) -> Array:
         """Return the mean reward of reaching from each state, (T, S) (thesis eq. 8.4); 0 where the state was not entered.
 
-        `scale`: unit of the remaining error in the reward, m.
+        The reward of one reach is 1 / (1 + remaining error / scale).  `scale`: m, the remaining error for which the reward is 1/2.
         """
         found = 1.0 / (1.0 + self.missing / scale)
         tried = np.isfinite(found)
@@ -160,7 +161,10 @@ class _Measuring:
 
 
 class Known:
-    """A predictor that returns the true mean rewards (S,) of each measured target; `scale`: unit of the remaining error, m."""
+    """A predictor that returns the true mean rewards (S,) of each measured target.
+
+    `truth`: the measured results.  `scale`: m, the remaining error for which the reward is 1/2, as in `Truth.rewards`.
+    """
 
     def __init__(self, truth: Truth, scale: float) -> None:
         self._rewards: dict[bytes, Array] = dict(
@@ -194,7 +198,8 @@ def oracle(truth: Truth, space: Space, plant: ReachPlant, beliefs: OutcomeModel,
     """Return an agent that knows the true rewards and the blocked transitions; it is to be evaluated on the measured targets.
 
     `truth`: the measured results.  `marker`: name of the marker that reaches.  `seed`: of the agent.  `beliefs`: transition model without
-    targets.  `scale`: unit of the remaining error in the reward, m.  A transition counts as blocked if at least half of its tries failed.
+    targets.  `scale`: m, the remaining error for which the reward is 1/2 (thesis eq. 8.4).  A transition is regarded as blocked if at least
+    half of its tries failed.
     """
     known = Known(truth, scale)
     agent = ReachAgent(space, plant, beliefs, marker=marker, predictor=known, strategy="greedy", failures="local", scale=scale, seed=seed)
@@ -210,8 +215,8 @@ Enter = Callable[[int], bool]  # goes to a state, and returns whether it was ent
 def remaining_errors(plant: ReachPlant, space: Space, targets: Sequence[ReachTarget], enter: Enter | None = None) -> Array:
     """Make one reach from each of the S states for each of the T targets; returns the remaining errors, (T, S) m.
 
-    NaN where the state was not entered.  The plant moves.  `enter`: function that brings the plant to a state, and returns whether it was
-    entered; None: by up to three actions.
+    NaN where the state was not entered.  The plant moves.  `enter`: function that takes a state, moves the plant to it, and returns True if
+    the plant arrived there.  None: the target is removed, and up to three actions are made to arrive there.
     """
     enter = enter or partial(_entered, plant, space)
     missing = np.full((len(targets), len(space)), np.nan)
@@ -230,7 +235,8 @@ def failed_transitions(plant: ReachPlant, space: Space, tries: int, enter: Enter
     """Try each transition without a target, and return the share of the tries that did not end in its goal, (S, A).
 
     `tries`: number of tries of each transition.  Tries that could not be made, because a state was not entered, count as successes.
-    `enter`: function that brings the plant to a state; None: by up to three actions.
+    `enter`: function that takes a state, moves the plant to it, and returns True if the plant arrived there.  None: up to three actions are
+    made to arrive there.
     """
     enter = enter or partial(_entered, plant, space)
     rng = np.random.default_rng(0)

@@ -22,7 +22,10 @@ from services.common.service import Service
 
 
 class BabblerNode:
-    """Commands random postures one after the other, logs every command that has ended, and answers every tick of lockstep."""
+    """Commands random postures one after the other, and writes each command that has ended to the log.
+
+    In lockstep every tick waits for its answer; it answers when it has sent its commands for this tick.
+    """
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:
         self._commands = 0

@@ -72,7 +72,10 @@ class AtDrives:
         service.on_run(self._forget)
 
     def move(self, k: int, dt: float) -> None:
-        """Send the position commands of tick `k`.  `dt`: duration of a tick [s].  If a part is not armed, arm all parts instead."""
+        """Send the position commands of tick `k`.  `dt`: duration of a tick [s].
+
+        If a part is not armed (released to follow commands), arm the parts that are not armed, and send no commands.
+        """
         if not self._states.are_complete():
             return
         states = self._states.newest

@@ -6,19 +6,19 @@ for at least 95 % of the reachable ones among the thesis' 27 targets, and for 90
 than 2 mm.  Source: aim of this reproduction (thesis 8, 9.3).  Published: no number.  Run time: 10 to 25 minutes per start on 2 cores.
 
 Seven joints of the right arm of the robot `icub` move at its table, under the default law, with ticks of 20 ms; PyBullet (with --backend
-mujoco: MuJoCo) simulates the robot, with gravity.  In each start (independent repetition) a learner (predictor gp, strategy ucb, failures
-alike) makes 3000 curious transitions and 800 tries of the 27 targets on the offline plant with the identified motors, then 54 live tries.
-Then, without learning, it tries each of the 27 and 50 new targets, each from another pose, with up to three reaches per try.  The planner
-("peer": inverse kinematics and RRT-Connect, with a new plan after every change) has the same targets, poses and robot, and the true model;
-the target exerts no force while the planner moves the arm, because the planner avoids it.  The learner also tries 8 targets that move back
-and forth over 15 cm at 3 cm/s, and 8 targets at rest for which a ball of 8 cm, in model and simulator, crosses the hand's path at the same
-speed.
+mujoco: MuJoCo) simulates the robot, with gravity.  In each start (independent repetition) a learner (`ReachAgent` with predictor "gp",
+strategy "ucb" and failures "alike") makes 3000 curious transitions and 800 tries of the 27 targets on the offline plant with the identified
+motors, then 54 live tries.  Then, without learning, it tries each of the 27 and 50 new targets, each from another pose, with up to three
+reaches per try.  The planner ("peer": inverse kinematics and RRT-Connect, with a new plan after every change) has the same targets, poses
+and robot, and the true model; the target exerts no force while the planner moves the arm, because the planner avoids it.  The learner also
+tries 8 targets that move back and forth over 15 cm at 3 cm/s, and 8 targets at rest, while a ball with a diameter of 8 cm crosses the
+hand's path at the same speed.  The ball is in the model and in the simulator.
 
 A target can be reached if inverse kinematics finds a pose within limits and cables, with the palm within 2 cm of the surface, in which the
 only contact of solids is that of hand and target (experiments/kit/reaching/README.md shows which).  All new targets can be reached.  A try
-is judged by the simulator's joint positions, not the encoders: by the position of the palm when the force ended, or when the planner had
-finished.  The learner makes the same tries on the offline plant too.
-The time to the first motion is measured with ticks of 2 ms, from the tick of the request to the first tick with another command.
+is judged by the simulator's joint positions, not the encoders: by the position of the palm when the force of the reach ended, or when the
+planner had finished.  The learner makes the same tries on the offline plant too.  The time to the first motion is measured with ticks of 2
+ms, from the tick of the request to the first tick with another command.
 """
 
 from __future__ import annotations
@@ -259,8 +259,8 @@ def enough(tries: Sequence[Judged], least: float) -> bool | None:
 class Runs:
     """The finished blocks of tries, and which of the thesis' 27 targets can be reached, by number.
 
-    `touchable`: targets for which inverse kinematics finds a pose that touches them.  `left`: targets among these that a reach of the
-    offline plant can touch; from the others the robot's own repulsive fields keep the palm away.
+    `touchable`: targets for which inverse kinematics finds a pose that touches them.  `left`: those of them that a reach of the offline
+    plant can also touch.  From the rest of `touchable` the robot's own repulsive fields keep the palm away.
     """
 
     blocks: Sequence[Block]
@@ -272,7 +272,7 @@ class Runs:
         return tries_of(self.blocks, contestant, kind, self.touchable if kind == GRID else None)
 
     def learning(self) -> list[Block]:
-        """Return the blocks in which the learner reached live for targets at rest, with or without learning."""
+        """Return the blocks of the learner's live tries for targets at rest: those in which it learned, and those of the test."""
         return [block for block in self.blocks if block.kind in ("refine", "learner")]
 
 
@@ -322,7 +322,7 @@ def quick(runs: Runs) -> Measured:
 
 @claim(OUR_AIM, f"{_LIVE} is no worse than inverse kinematics and RRT-Connect (at most {100 * WORSE:.0f} points of success below)", "-")
 def no_worse(runs: Runs) -> Measured:
-    """Compare the success of learner and planner in the same tries; undecided for fewer than 20 tries."""
+    """Return the successes of learner and planner in the same tries as text, and the verdict; None (undecided) for fewer than 20 tries."""
     rivals = {name: runs.tries(name, GRID) + runs.tries(name, FRESH) for name in CONTESTANTS}
     learner, peer = (np.array([tried.success for tried in made]) for made in rivals.values())
     text = "; ".join(f"{NAMES[contestant]} {share(made)}" for contestant, made in rivals.items())

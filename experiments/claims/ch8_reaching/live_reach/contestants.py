@@ -3,8 +3,8 @@
 
 `learned_offline` makes the learner's tries on the offline plant, for comparison.
 
-The launched performer calls `perform` (experiments/kit/live/performer).  It reads {part}/motion, {part}/reach and commands, and calls
-{part}/rpc/{take,goal,reach} of the controller and model/rpc/world/{add,remove}.
+The performer, a service that calls a function of an experiment (experiments/kit/live/performer), calls `perform`.  It reads {part}/motion,
+{part}/reach and commands, and calls {part}/rpc/{take,goal,reach} of the controller and model/rpc/world/{add,remove}.
 """
 
 from __future__ import annotations
@@ -123,10 +123,11 @@ class Ended:
 
 
 def contestant(hand: Hand, job: Job, mover: Mover | None) -> Callable[[Problem], Ended]:
-    """Return a function that lets the contestant of a job attempt a problem.
+    """Return a function that lets the contestant of a job (the learner, the planner, or the reach alone) attempt a problem.
 
-    A learner is loaded, with its predictions for the job's targets, before this returns.  In a job of the kind "first motion", `hand` times
-    the first motions from now on.  `mover`: moves the target or the obstacle during an attempt; None: nothing moves.
+    A learner is loaded now, and its slow first predictions for the job's targets are made now, so that they do not delay the attempts.  In
+    a job of the kind "first motion", `hand` times from now on when each reach begins to move.  `mover`: moves the target or the obstacle
+    during an attempt; None: nothing moves.
     """
     if job.kind == "peer":
         return partial(planned, hand, job.seed)
@@ -163,9 +164,10 @@ def learned(hand: Hand, agent: ReachAgent, seed: int, mover: Mover | None, probl
 
 
 def learned_offline(job: Job) -> Block:
-    """Let the learner that was refined live attempt the problems of a job on the offline plant, and return the block of tries.
+    """Let the learner attempt the problems of a job on the offline plant, and return the block of tries.
 
-    It attempts them as in `learned`.  Contacts are not recorded, so the block has none.  The learner learns nothing.
+    The learner is loaded from the job's store, with all that it learned offline and live.  It attempts the problems as in `learned`, and
+    learns nothing.  Contacts are not recorded, so the block has none.
     """
     plant, tries = offline_plant(job.seed), list[Judged]()
     agent = load_reaches(job.store, plant, PART)
@@ -247,7 +249,7 @@ class PeerPlant(WrappedPlant[Hand]):
 
     @property
     def time(self) -> float:
-        """The robot time, s."""
+        """The time of the robot's clock, s: the number of the current tick times the duration of a tick."""
         return self.inner.tick * self._dt
 
     def go(self, part: str, target: Array, marker: str) -> Outcome:

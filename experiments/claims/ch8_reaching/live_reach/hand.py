@@ -25,9 +25,10 @@ UPRIGHT, SPHERE = [1.0, 0.0, 0.0, 0.0], Geometry(kind="sphere", size=[RADIUS])
 
 
 class Hand(BusPlant):
-    """The live arm as a plant, which records the ticks at which its reaches were requested, began to move, and ended.
+    """The live arm as a plant, which records when its last reach was requested, began to move, and ended.
 
-    The ticks are `asked`, `first` (counted from the request; -1: not timed) and `end`.
+    `asked`: tick of the last request.  `first`: number of ticks from it to the first command that moves the arm; -1: not timed.  `end`:
+    tick at which the force of the reach ended.
     """
 
     def __init__(self, service: Service, robot: Robot) -> None:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The live arm and its problems: robot, law and states, targets, first poses, and the learner that is trained offline.
 
-The problems are the thesis' 27 targets and new ones between them, each with a random first pose, at rest or with a target or an obstacle
-that moves.
+A problem is a target to be reached from a random first pose.  The targets are the thesis' 27 and new ones between them.  In most problems
+nothing moves; in the others the target moves, or an obstacle.
 """
 
 from __future__ import annotations
@@ -133,9 +133,9 @@ def grid_problems(seed: int) -> list[Problem]:
 
 
 def fresh_problems(seed: int, count: int) -> list[Problem]:
-    """Return `count` problems with new targets, drawn in the box around the 27 targets, that can be reached.
+    """Return `count` problems with new targets that can be reached.
 
-    `seed`: of the draw.  Raises InvalidValue if 1000 draws are not enough.
+    The targets are drawn in the box around the 27 targets.  `seed`: of the draw.  Raises InvalidValue if 1000 draws are not enough.
     """
     rng, known, places = np.random.default_rng([seed, 50]), belief(), grid()
     found: list[Problem] = []
@@ -216,7 +216,8 @@ def posture(known: PeerBelief, q: Array) -> Array:
 def train(file: Path, seed: int, transitions: int, tries: int) -> None:
     """Learn transitions, and then to reach for the 27 targets, on the offline plant; everything is recorded in `file`.
 
-    `seed`: of agent and plant.  `transitions`, `tries`: numbers to be reached in all, so that an interrupted call can be repeated.
+    `seed`: of agent and plant.  `transitions`, `tries`: total numbers at the end.  What `file` already has is included, so that an
+    interrupted call can be repeated.
     """
     plant = offline_plant(seed)
     with TransitionStore(file, PART) as store:
@@ -227,9 +228,9 @@ def train(file: Path, seed: int, transitions: int, tries: int) -> None:
 
 
 def learner(plant: ReachPlant, seed: int, file: Path) -> ReachAgent:
-    """Return the reach learner that continues the record in `file`, or begins it; `file` has the learned transitions.
+    """Return the reach learner that records its reaches in `file`; it continues with those that are already recorded there.
 
-    `seed`: of the learner.
+    The learned transitions must already be in `file`.  `seed`: of the learner.
     """
     known = load_learned(file, PART, plant.robot)
     store = ReachStore(file, PART)

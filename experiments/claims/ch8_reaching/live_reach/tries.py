@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tries on the live robot: the job of a launch, its record, its measures by the simulator's joints, and the reasons of misses.
+"""Tries on the live robot: what a launch is to do, the record of each try, and measures computed from the simulator's joint positions.
 
     python -m experiments.claims.ch8_reaching.live_reach.tries
 
-prints, within minutes, the smallest distance of offline reaches from each of the 27 targets that can be reached.
+prints, within minutes, for each of the 27 targets that can be reached, how near a reach of the offline plant comes to it, and, if the reach
+misses, the contacts at its end.
 """
 
 from __future__ import annotations
@@ -46,8 +47,9 @@ Kind = Literal["refine", "learner", "peer", "offline", "moving", "first motion"]
 class Job(Struct, frozen=True):
     """A block of tries in one launch of the live system.
 
-    `kind`: which contestant makes the tries.  `seed`: of the contestant.  `problems`: targets that are tried, with the first postures of
-    the arm.
+    `kind`: who makes the tries.  "learner": the learner; "offline": the learner on the offline plant; "moving": the learner, while a target
+    or an obstacle moves; "peer": the planner; "first motion": single reaches, timed; "refine": the learner continues to learn.  `seed`: of
+    the contestant.  `problems`: targets that are tried, with the first postures of the arm.
     """
 
     kind: Kind
@@ -63,11 +65,12 @@ class Tried(Struct, frozen=True):
     """The record of one try by the contestant; ticks are those of robot_sim.
 
     `kind`, `number`: of the problem.  `out`: tick at which the arm started towards its first posture.  `begin`: tick at which the target
-    was presented.  `ends`: ticks at which the reaches ended, or at which the planner had finished.  `over`: tick at which the arm was at
-    rest again.  `off`: largest error of a joint in the first posture, rad.  `actions`: number of actions, reaches included.  `believed`:
-    distance of the palm from the target's surface at the end, by the encoders, m.  `thinking`: processor time for plans, s.  `why`: reason
-    if the try ended without a reach.  `asked`: tick of the last request.  `there`: position of a moving target at the last of the ends, m.
-    `first`: ticks from the last request to the first command that moves the arm; -1: not timed.
+    was presented.  `ends`: ticks at which reaches ended; of the planner, ticks at which it measured its remaining distance from the target.
+    `over`: tick at which the arm was at rest again.  `off`: largest error of a joint in the first posture, rad.  `actions`: number of
+    actions, reaches included.  `believed`: distance of the palm from the target's surface at the end, by the encoders, m.  `thinking`:
+    processor time for plans, s.  `why`: reason if the try ended without a reach.  `asked`: tick of the last request that was sent to the
+    arm.  `there`: position of a moving target at the last tick in `ends`, m; None: the target is at rest.  `first`: ticks from `asked` to
+    the first command that moves the arm; -1: not timed.
     """
 
     kind: str
@@ -91,10 +94,10 @@ class Judged(Struct, frozen=True):
 
     `kind`, `number`: of the problem.  `position`: of the target, m.  `off`: distance of the palm from the target's surface at the end of
     the try (of its last reach, or of the planner's last motion), m.  `success`: whether this is at most 2 cm.  `seconds`: robot time from
-    the presentation of the target to this end.  `actions`: number of actions, including the `reaches`.  `thinking`: processor time for
-    plans, s.  `deep`: contacts of solids deeper than 2 mm.  `begun_off`: largest error of a joint in the first posture, rad.  `why`: reason
-    if the try was interrupted.  `first`, `first_motion`: ticks from the request to the first command that moves, and to the first motion of
-    a joint; -1: not timed.
+    the presentation of the target to the end of the try.  `actions`: number of actions, including the `reaches`.  `thinking`: processor
+    time for plans, s.  `deep`: contacts of solids deeper than 2 mm.  `begun_off`: largest error of a joint in the first posture, rad.
+    `why`: reason if the try was interrupted.  `first`: ticks from the last request (`Tried.asked`) to the first command that moves the arm;
+    `first_motion`: ticks from that request to the first motion of a joint; -1: not timed.
     """
 
     kind: str
@@ -116,7 +119,7 @@ class Judged(Struct, frozen=True):
 class Block(Struct, frozen=True):
     """All tries of one job with their measures.
 
-    `kind`: of the job.  `rate`: ticks per second.  `seconds`: robot time of the launch.  `repeatable`: whether the run can be repeated
+    `kind`: as in `Job`.  `rate`: ticks per second.  `seconds`: robot time of the launch.  `repeatable`: whether the run can be repeated
     exactly.  `deep`: contacts of solids deeper than 2 mm in the whole launch.
     """
 
@@ -146,8 +149,9 @@ def measure(folder: Path, job: Job, rate: float, repeatable: bool) -> Block:
 def judge(tried: Tried, position: Array, q: Array, deep: list[Touch], model: Model, rate: float) -> Judged:
     """Return the measures of one try, such as its success.
 
-    `position`: of the target's centre (3,) m.  `q`: (T, n) rad, joint positions of the simulator; row k - 2 has those at the beginning of
-    tick k.  `deep`: contacts of solids deeper than 2 mm in the launch.  `rate`: ticks per second.
+    `tried`: record of the try.  `position`: of the target's centre (3,) m.  `q`: (T, n) rad, joint positions of the simulator; those at
+    the beginning of tick k are in row k - 2.  `deep`: contacts of solids deeper than 2 mm in the launch.  `model`: of the robot; it
+    computes the position of the palm.  `rate`: ticks per second.
     """
     off = np.inf
     if tried.ends:
@@ -222,7 +226,7 @@ def _contacts(plant: OfflinePlant, q: Array) -> str:
 
 
 def main() -> None:
-    """Print a table, in Markdown, of the targets that can be reached, with the best offline reach and the contacts at its end.
+    """Simulate reaches for all targets that can be reached, and print a Markdown table with the best reach for each of them.
 
     A row has the number of the target, its position [m], the distance [mm] of the palm from it after the best reach, and the contacts there
     if the reach missed.
