@@ -177,7 +177,10 @@ class Answer(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Commands(Message, frozen=True, kw_only=True):
-    """Commands to the motors of several parts, computed from the state of tick re_k; parts that are not named are not affected."""
+    """Commands to the motors of several parts, computed from the state of tick re_k; parts that are not named are not affected.
+
+    The parts hold `ttl` ms after the start of that tick. `parts` has the kind of command of each part, `ref` its values for all motors.
+    """
 
     stream: ClassVar[Stream] = Stream("commands", "CONTROL", writers=("controller", "driver"), readers=("robot_sim",), when="every tick")
 

@@ -73,9 +73,10 @@ class Roadmap:
         return int(self._from(q_from).argmin())
 
     def exit(self, y_goal: ArrayLike) -> int:
-        """Return the vertex nearest to the task coordinates `y_goal` (m,), measured in spacings.
+        """Return the vertex nearest to the task coordinates `y_goal`, shape (m,).
 
-        Raises InvalidValue if no vertex is within MAX_GOAL_DISTANCE (1.5 spacings).
+        Each coordinate is divided by its spacing, the distance of neighbouring vertices along it, before distances are computed. Raises
+        InvalidValue if no vertex is within MAX_GOAL_DISTANCE (1.5 spacings).
         """
         return int(self._to(y_goal).argmin())
 

@@ -27,7 +27,7 @@ class Difference:
 
     `field`: path of the field in the message, such as "q[3]"; "message" if one recording does not contain the message. `first`, `second`:
     value of the field in each recording; the text "missing" if that recording does not contain the message or field. If the recordings
-    do not have the same ticks, `key` is "tick", `field` is "k", and `first` and `second` are the numbers of the ticks.
+    do not have the same ticks, `key` is "tick", `field` is "k", and `first` and `second` are the indices of the ticks that each has there.
     """
 
     tick: int

@@ -161,8 +161,8 @@ class Service(Listener):
     def on_request(self, key: str, cls: type[_Q], handler: Callable[[_Q, str], Reply], part_of_key: bool = False) -> None:
         """Answer calls of `key` with the reply that handler(request, key) returns.
 
-        `cls`: type of the requests. The handler may raise CallRefused. `part_of_key`: True: the key begins with the name of a part; a
-        vector of the request with one entry per motor of a part must then have as many entries as this part has motors.
+        `cls`: type of the requests. The handler may raise CallRefused. `part_of_key`: True: the key begins with the name of a part; then
+        requests are refused whose vectors of motor values do not have as many entries as this part has motors.
         """
 
         def enqueue(query: zenoh.Query) -> None:

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Change one parameter of the plant at a time, and measure whether the findings about the shoulder's cables remain.
 
-Claim: on the lattice of rank 4 four states are never reached and four others hardly ever; three actions towards the latter end one pitch
-level higher.  On rank 3 the actions 15->24, 42->51 and 69->78 fail and 21->24 succeeds.  The parameters of the 2014 program reproduce these
-findings.  They depend on the cable forces and on the thresholds below which an action has settled, and not on delay, lag, backlash or a
-little noise.
+Claim: on the lattice of rank 4 (four levels of each joint) four states are never reached, and four others hardly ever; three actions whose
+goals are among these others end one pitch level higher.  On rank 3 the actions 15->24, 42->51 and 69->78 fail and 21->24 succeeds.  The
+parameters of the 2014 program reproduce these findings.  They depend on the cable forces and on the thresholds below which an action has
+settled, and not on delay, lag, backlash or a little noise.
 Source: thesis 7.2.5, 7.3 (the findings); the study is ours.  Published number: none.  Run time: 15 minutes on 2 cores.
 
 The left arm explores with curiosity: 5000 actions on rank 4 (levels at 20-80 % of the ranges) and 3000 on rank 3 (25-75 %).  In each

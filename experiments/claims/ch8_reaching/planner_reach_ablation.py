@@ -2,7 +2,7 @@
 """Compare the coarse planner alone, the reactive reach alone, and both together.
 
 Claim: a coarse discrete planner together with a reactive reach achieves more than either alone.  The planner needs few states, because the
-reach covers the remaining distance; only together do they bring the hand from arbitrary poses around the targets.
+reach covers the remaining distance; only together do they bring the hand to the targets from arbitrary poses, also from behind a target.
 Source: thesis 5.3, 8.2, 9.3.  Published: no numbers.  Run time: three minutes on 2 cores.
 
 Robots: the right arm of 2014 under the published control law, and today's right arm under the default law.  There are 27 targets that the
@@ -11,9 +11,9 @@ palm can touch, 19 of the thesis and 8 drawn between them.  Each case begins in 
 Methods.  "planner": the MDP plans to the state whose sample has the palm nearest to the target, and stops there.  "reach": a force pulls
 the palm to the target from the first pose.  "both": a learner with 3000 curious transitions and 800 tries without obstacles plans to the
 state with the highest expected reward of a reach, and reaches from there; it learns nothing from these cases.  Both planners ("planner" and
-"both") use the learned outcomes of transitions and the learned failures due to targets, and remember within a case which transitions
-failed.  Under the default law up to three reaches are made per case until one does not miss: "both" first plans to another state, "reach"
-repeats in place.
+"both") use the learned outcomes of transitions, know which transitions a target blocks, as was learned, and remember within a case which
+transitions failed.  Under the default law up to three reaches are made per case until one does not miss: "both" first plans to another
+state, "reach" repeats in place.
 
 Scenes: free space; the hand behind the target, as seen from the shoulder; the arm within 3 cm of the object, with the palm turned away; a
 ball of 8 cm between hand and target, which only MoBeE's model contains; a target that moves 5 to 12 cm at 3 cm/s.

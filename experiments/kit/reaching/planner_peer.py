@@ -2,9 +2,9 @@
 """The planner with which reach learners are compared: inverse kinematics and RRT-Connect, executed through MoBeE.
 
 The planner has a belief about robot and world (`kit.reaching.belief`), which may differ from the plant, and it plans again after every
-change.  If a motion does not end as planned, the planner plans again from the present pose of the arm, and avoids a pose near the end of
-the motion.  A planner with a memory avoids this pose in later tries, too.  If the target was touched at the end of the motion, the pose is
-avoided only for this target, else for all targets, as thesis 9.4.1 distinguishes workspace and body.
+change.  If a motion does not end as planned, the planner plans again from the present pose of the arm, and avoids a pose near that in which
+the motion ended.  A planner with a memory avoids this pose in later tries, too.  If the target was touched at the end of the motion, the
+pose is avoided only for this target, else for all targets, as thesis 9.4.1 distinguishes workspace and body.
 """
 
 from __future__ import annotations

@@ -54,7 +54,7 @@ class Descent:
     def run(self, q: Array, goals: Array | None = None) -> Array:
         """Search from the start poses q (B, n) rad; return only the K solutions whose residuals are all within the tolerances, (K, n) rad.
 
-        `goals`: (B, 26 k), for each start its own goals of the k aims in `besides` (an argument of the class). Row i is the result of
+        `goals`: (B, 26 k), other values of the k additional aims (`besides` of the class) for each start. Row i is the result of
         `aim_reals` for the k aims of start i, which have the same kinds, links and motors as `besides`, in the same order. None: `besides`
         for all starts.
         """
@@ -64,7 +64,7 @@ class Descent:
     def met(self, q: Array, goals: Array | None = None) -> tuple[Array, Flags]:
         """Return the solutions (B, n) rad found from the starts q (B, n) rad, and whether each is within the tolerances of all aims, (B,).
 
-        `goals`: (B, 26 k), for each start its own goals of the k aims in `besides` (an argument of the class). Row i is the result of
+        `goals`: (B, 26 k), other values of the k additional aims (`besides` of the class) for each start. Row i is the result of
         `aim_reals` for the k aims of start i, which have the same kinds, links and motors as `besides`, in the same order. None: `besides`
         for all starts.
         """
@@ -75,7 +75,7 @@ class Descent:
     def ends(self, q: Array, goals: Array | None = None) -> tuple[Array, Array]:
         """Return the solutions (B, n) rad found from the starts q (B, n) rad, and the residuals of all aims there, (B, aims), m or rad.
 
-        `goals`: (B, 26 k), for each start its own goals of the k aims in `besides` (an argument of the class). Row i is the result of
+        `goals`: (B, 26 k), other values of the k additional aims (`besides` of the class) for each start. Row i is the result of
         `aim_reals` for the k aims of start i, which have the same kinds, links and motors as `besides`, in the same order. None: `besides`
         for all starts. The columns of the residuals are the aims of the problem's terms, then `besides`. The number of evaluated poses is
         added to `problem.evaluations`.
