@@ -29,7 +29,7 @@ class Coordinate:
     """One task coordinate y_i: a number computed from a pose, and the range that the roadmap covers.
 
     `low`, `high`: the range, in `unit`. `unit`: that of the coordinate, "m", "rad" or "" (no unit). `function`: computes the coordinate
-    (N,) of a batch of poses q (N, n). `aims`: function of the robot and a value; it returns residuals (`Aim`s) for least squares. If
+    (N,) of a batch of poses q (N, n). `aims`: function of the robot and a value; it returns residuals of type `Aim` for least squares. If
     these are 0 in a pose, the coordinate has this value. None if the coordinate has no derivative. Raises InvalidValue unless low < high.
     """
 
@@ -77,7 +77,7 @@ class Task:
         return y
 
     def aims(self, robot: Robot, y: Array) -> tuple[Aim, ...] | None:
-        """Return the residuals (`Aim`s) for least squares that are 0 at task coordinates y (m,); None if one has no derivative."""
+        """Return the residuals of type `Aim` for least squares that are 0 at task coordinates y (m,); None if one has no derivative."""
         found: list[Aim] = []
         for one, value in zip(self.coordinates, y, strict=True):
             if one.aims is None:
