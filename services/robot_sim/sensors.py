@@ -81,9 +81,10 @@ class Sensors:
     A sample has the encoder positions, velocities and torques of the part's motors at one time.
     """
 
-    def __init__(self, bus: Bus, robot: Robot, dt: float, errors: Array) -> None:
-        """`dt`: the tick, s. `errors`: (n,) rad, constant errors of the encoders, reading minus true position."""
-        self._bus, self._dt, self._errors = bus, dt, errors
+    def __init__(self, bus: Bus, robot: Robot, dt: float, errors: Array | None = None) -> None:
+        """`dt`: the tick, s. `errors`: (n,) rad, constant errors of the encoders, reading minus true position; None: none."""
+        self._bus, self._dt = bus, dt
+        self._errors = np.zeros(len(robot.motors)) if errors is None else errors
         self._where = {name: part.slice for name, part in robot.parts.items()}
         self._streams = {part: bus.publisher(State, part) for part in robot.parts}
         self._tick = bus.publisher(Tick)
