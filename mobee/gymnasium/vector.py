@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -39,7 +38,10 @@ class RobotVectorEnv(VectorEnv[Any, Any, Any]):
 
     def _restart_all(self, seed: int | Sequence[int | None] | None) -> None:
         """Begin all episodes; random generators with a seed are new, as in separate environments."""
-        seeds = [seed + number for number in range(self.num_envs)] if isinstance(seed, int | Integral) else seed or [None] * self.num_envs
+        if seed is None:
+            seeds: Sequence[int | None] = [None] * self.num_envs
+        else:
+            seeds = seed if isinstance(seed, Sequence) else [seed + number for number in range(self.num_envs)]
         self._rngs = [rng if one is None else np_random(one)[0] for rng, one in zip(self._rngs, seeds, strict=True)]
         self._steps[:], self._over[:] = 0, False
 

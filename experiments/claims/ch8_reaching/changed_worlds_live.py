@@ -40,7 +40,20 @@ import numpy as np
 from msgspec import Struct, structs
 
 from bus_schema.messages import Truth as TruthMessage
-from experiments.claims.ch8_reaching.changed_worlds import BALLS, RADIUS
+from experiments.claims.ch8_reaching import changed_worlds
+from experiments.claims.ch8_reaching.changed_worlds import (
+    BACK,
+    BALLS,
+    MAX_FAILURES,
+    PRACTICE,
+    RADIUS,
+    RAISED,
+    TRIES,
+    TURNS,
+    change_world,
+    claims_of_each_change,
+    errors_after,
+)
 from experiments.claims.ch8_reaching.live_reach.hand import Hand
 from experiments.claims.ch8_reaching.live_reach.problems import (
     GAINS,
@@ -54,17 +67,17 @@ from experiments.claims.ch8_reaching.live_reach.problems import (
     train,
 )
 from experiments.kit.control.plant_runs import place
-from experiments.kit.experiment import MIN_SEEDS, OUR_AIM, Claim, Experiment, Measured, judged
+from experiments.kit.experiment import MIN_SEEDS, Experiment, Measured, judged
 from experiments.kit.learning.arm import RIGHT
 from experiments.kit.live.launch import TABLE, add_backend, append_done, launch, read_done, read_job, write_job
 from experiments.kit.plots import finish, new_figure, ticks_at
-from experiments.kit.reaching.arm import MARKER, PART, Errors, JudgedPlant
+from experiments.kit.reaching.arm import MARKER, PART, JudgedPlant
 from experiments.kit.reaching.seen_hand import SeenHand
 from experiments.kit.reaching.truth import Truth, failed_transitions, load_truth, oracle, remaining_errors
 from experiments.kit.rules import decides
 from experiments.kit.statistics import estimate, interval
 from experiments.kit.sweep import Cells, Condition, Sweep
-from mobee import Gains, Model, MotorParameters, OfflinePlant, World, load_robot, load_world, sphere
+from mobee import Gains, Model, MotorParameters, OfflinePlant, World, load_robot, load_world
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
 from mobee.learning.reaching.reach_agent import ReachAgent
@@ -75,16 +88,12 @@ from mobee.robot.robot import Robot
 from mobee.store import STORE
 from services.common.service import Service
 
-TRIES, LIVE_TRIES = 200, 27  # before the change: offline and live
+LIVE_TRIES = 27  # before the change, after TRIES (200) offline
 CHECKPOINTS, REPETITIONS = (0, 60), (1, 2)  # problem-tries after it, and the number of evaluations after these
 ORACLE_REPETITIONS = 4  # evaluations
-PRACTICE = 300  # problem-tries in the world as it is seen, after an object has appeared or moved
-BACK, MAX_FAILURES = 0.95, 2.0  # of the oracle's score; failed transitions per evaluation
-RAISED = 0.08  # m
-SEEN, SEEN_RADIUS = 0.01, 0.005  # m, standard deviations of the errors along each axis, and of a radius, of an object that is seen
-TURNS = dict(zip(RIGHT, np.deg2rad([5.0, -5.0, 5.0, -5.0]).tolist(), strict=True))  # rad, true minus measured
+BALL = 0  # number of the ball that appears
 SEEDS = 5
-CHANGES = {"ball": "a ball appears", "table": "the table is raised", "turn": "joints are miscalibrated"}
+CHANGES = {change: name for change, name in changed_worlds.CHANGES.items() if change != "nothing"}
 SCALE = 0.01  # m, unit of the remaining error in the reward
 KEPT_TICKS = 4096
 LATE = 5.0  # s of real time for which a message of the simulator's true posture may be late
@@ -227,10 +236,8 @@ def measured_truth(change: str, seed: int) -> Truth:
 
     `change`: key of CHANGES.  `seed`: of the plant.
     """
-    turns, targets = np.zeros(len(robot().motors)), grid_targets()
-    if change == "turn":
-        turns[[robot().motor_index(name) for name in TURNS]] = list(TURNS.values())
-    plant = JudgedPlant(offline_plant_in(changed_world(change), seed), Errors(turns, np.zeros(3)))
+    targets = grid_targets()
+    plant = JudgedPlant(offline_plant_in(changed_world(change), seed), errors_after(change, robot()))
     enter = partial(_put_into, plant)
     missing, failed = remaining_errors(plant, space(), targets, enter), failed_transitions(plant, space(), 2, enter)
     every_place = np.broadcast_to(failed, (len(targets), *failed.shape))  # measured without a target
@@ -251,9 +258,7 @@ def seen_plant(change: str, seed: int) -> OfflinePlant:
 
     `change`: "ball" or "table".  `seed`: of errors and plant.
     """
-    rng = np.random.default_rng([seed, 7])
-    error, error_of_radius = rng.normal(0.0, SEEN, 3), float(rng.normal(0.0, SEEN_RADIUS))
-    return offline_plant_in(changed_world(change, error, error_of_radius), seed)
+    return offline_plant_in(changed_world(change, np.random.default_rng([seed, 7])), seed)
 
 
 def offline_plant_in(world: World, seed: int) -> OfflinePlant:
@@ -262,14 +267,9 @@ def offline_plant_in(world: World, seed: int) -> OfflinePlant:
     return OfflinePlant(Model(robot(), world), seed, Gains.named(GAINS), motors, 1.0 / RATE, active=active)
 
 
-def changed_world(change: str, error: Array | None = None, error_of_radius: float = 0.0) -> World:
-    """Return the world after a change; `error`: (3,) m, of the position of the changed object (None: none), `error_of_radius`: m."""
-    world, shift = load_world(str(TABLE)), np.zeros(3) if error is None else error
-    if change == "table":
-        world.move("table", position=world.objects["table"].position + np.array([0.0, 0.0, RAISED]) + shift)
-    if change == "ball":
-        world.add("ball", sphere(RADIUS + error_of_radius), position=np.array(BALLS[0]) + shift)
-    return world
+def changed_world(change: str, seen: np.random.Generator | None = None) -> World:
+    """Return the world after a change; `change`: key of CHANGES, "" for none.  `seen`: draws errors, as in `change_world`."""
+    return change_world(load_world(str(TABLE)), change, BALL, seen)
 
 
 def world_file(change: str, folder: Path) -> Path:
@@ -278,7 +278,7 @@ def world_file(change: str, folder: Path) -> Path:
     if change == "table":
         text = text.replace('pz="-0.35"', f'pz="{RAISED - 0.35:g}"')
     if change == "ball":
-        x, y, z = BALLS[0]
+        x, y, z = BALLS[BALL]
         text = text.replace("</World>", f' <sphere name="ball" radius="{RADIUS}" px="{x}" py="{y}" pz="{z}"/>\n</World>')
     path.write_text(text)
     return path
@@ -411,25 +411,7 @@ def _few(change: str, runs: Runs) -> Measured:
     return text, decides(interval(after), most=MAX_FAILURES) if len(after) >= MIN_SEEDS else None
 
 
-def _of_each_change(text: str, published: str, rule: Callable[[str, Runs], Measured]) -> list[Claim]:
-    return [
-        Claim(OUR_AIM, f"on the live robot, {name}: 60 problem-tries later, {text}", published, rule=partial(rule, change))
-        for change, name in CHANGES.items()
-    ]
-
-
-CLAIMS = (
-    *_of_each_change(
-        f"the learner that sees its hand and the objects has at least {BACK:.2f} of the score of the new world's oracle",
-        f"at least {BACK:.2f}",
-        _back,
-    ),
-    *_of_each_change(
-        f"at most {MAX_FAILURES:.0f} transitions fail in an evaluation of the learner that sees its hand and the objects",
-        f"at most {MAX_FAILURES:.0f}",
-        _few,
-    ),
-)
+CLAIMS = tuple(claims_of_each_change(_back, _few, "on the live robot, "))
 
 
 def plot(found: Cells) -> Any:
