@@ -17,7 +17,7 @@ from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
 from mobee.learning.reaching.failures import FailuresSinceChange, by_target
 from mobee.learning.reaching.planning import REACH, ReachPlanning
-from mobee.learning.reaching.predictors.predictor import RewardPredictor
+from mobee.learning.reaching.predictors.predictor import RewardPredictor, begin_world
 from mobee.learning.reaching.tries import Step
 
 SHARES = np.array([0.01, 0.03, 0.1, 0.2, 0.4, 0.7, 0.95])  # of outcomes that contradict what was learned, equally likely at first
@@ -189,10 +189,12 @@ class WorldChanges:
     def report(self) -> None:
         """Record that the world changes now; for a change that is known without the detector.
 
-        Transitions before this call are no longer evidence of what the world blocks for all targets. The detector starts anew, because
-        the outcomes before the change are no evidence about changes after it.
+        Transitions before this call are no longer evidence of what the world blocks for all targets. The predictor, if it can, compares
+        later rewards with earlier ones. The detector starts anew, because the outcomes before the change are no evidence about changes
+        after it.
         """
         self._failures.change(0)
+        begin_world(self._predictor)
         self.restart()
 
     def restart(self) -> None:

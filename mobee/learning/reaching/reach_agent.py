@@ -13,6 +13,7 @@ from mobee.errors import ActionInterrupted, InvalidValue
 from mobee.learning.reaching.evaluation import Evaluation, evaluate, move, reach
 from mobee.learning.reaching.learner import ReachLearner, ReachSettings
 from mobee.learning.reaching.planning import REACH, ReachPlan, plan_reach
+from mobee.learning.reaching.predictors.predictor import begin_world
 from mobee.learning.reaching.reaches import Reaches, reaches_of
 from mobee.learning.reaching.store import ReachStore
 from mobee.learning.reaching.tries import Step, Try
@@ -121,8 +122,9 @@ class ReachAgent(ReachLearner):
 
         A problem-try is one attempt to reach one target. After the robot has perceived a change of the world, such as a new object,
         practice reduces the number of tries on the robot. If the agent has a detector of changes, it assumes that the world changed just
-        before the first of these tries. A problem-try under way is ended first. The attributes `tries` and `steps` include the tries and
-        actions on both plants. `plant`: moves the space's robot. `problems`, `tries`: as in `learn`.
+        before the first of these tries. The predictor "gp" estimates how similar the rewards on both plants are, and those before the
+        change; the less similar, the less they count on the robot. A problem-try under way is ended first. The attributes `tries` and
+        `steps` include the tries and actions on both plants. `plant`: moves the space's robot. `problems`, `tries`: as in `learn`.
 
         Raises InvalidValue for a plant of another robot, or if the agent has a store, which holds what happened to one robot only.
         """
@@ -130,7 +132,9 @@ class ReachAgent(ReachLearner):
         if self.store is not None:
             raise InvalidValue("an agent with a store cannot practise: the store holds the steps of one robot only. Make it without store.")
         self.end_try()
-        if self.changes is not None:
+        if self.changes is None:
+            begin_world(self.predictor)
+        else:
             self.changes.report()
         own = self.plant
         self.plant, self._state = plant, None
@@ -138,6 +142,7 @@ class ReachAgent(ReachLearner):
             self.learn(problems, tries)
         finally:
             self.plant, self._state = own, None
+            begin_world(self.predictor)
             if self.changes is not None:
                 self.changes.restart()  # differences between the two plants are no change of the world
 

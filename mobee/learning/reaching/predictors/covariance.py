@@ -16,6 +16,7 @@ import numpy as np
 from mobee.arrays import Array, Ints
 from mobee.learning.reaching.predictors.linear_arm import LinearArm
 from mobee.learning.reaching.predictors.observed import Reached
+from mobee.learning.reaching.predictors.worlds import ONE_WORLD, scales_of
 from mobee.learning.reaching.reaches import Reaches
 
 OFFSET = 0.3**2  # variance of the common part of all rewards
@@ -110,11 +111,12 @@ class Covariance:
         total: Array = place + approach + self._value[_DISTANCE] * distance + OFFSET
         return total
 
-    def with_slopes(self, a: Points, count: Array) -> tuple[Array, Slopes]:
+    def with_slopes(self, a: Points, count: Array, scales: Array) -> tuple[Array, Slopes]:
         """Return the covariance (n, n) of the average rewards of n reaches, and a function that computes its derivatives.
 
-        `a`: the reaches. `count`: (n,) number of tries over which the reward of each reach is averaged. The function takes weights (n, n).
-        It returns the derivatives (8 + d,) of the sum of weights times covariance with respect to the logarithms of the parameters.
+        `a`: the reaches. `count`: (n,) number of tries over which the reward of each reach is averaged. `scales`: (n, n) from
+        `worlds.scales_of`. The function takes weights (n, n). It returns the derivatives (8 + d,) of the sum of weights times covariance
+        with respect to the logarithms of the parameters.
         """
         value, pair = self._value, np.ix_(a.state, a.state)
         place_far = _squared(a.target, a.target) / value[_PLACE_L] ** 2
@@ -126,13 +128,15 @@ class Covariance:
 
         def slopes(weights: Array) -> Array:
             """Return the derivatives of the sum of weights (n, n) times the covariance by the logarithms of the parameters."""
+            noise = (weights.diagonal() / count).sum() * value[_NOISE]
+            weights = weights * scales
             by_place, by_approach, by_distance = weights * place, weights * approach, weights * distance
             narrower = by_approach / value[_APPROACH_J] ** 2
             by_joint = [float((by_place * far).sum()) for far in joints]
             by_joint_too = [float((narrower * far).sum()) for far in joints]
             return np.array(
                 [
-                    (weights.diagonal() / count).sum() * value[_NOISE],
+                    noise,
                     by_place.sum(),
                     (by_place * place_far).sum(),
                     by_approach.sum(),
@@ -144,7 +148,7 @@ class Covariance:
                 ]
             )
 
-        return place + approach + distance + OFFSET + np.diag(value[_NOISE] / count), slopes
+        return (place + approach + distance + OFFSET) * scales + np.diag(value[_NOISE] / count), slopes
 
 
 def _squared(a: Array, b: Array) -> Array:
@@ -162,7 +166,22 @@ PRIOR_DEVIATION = 1.0  # of the logarithm of a parameter around its default
 MAX_STEPS = 40  # of the search
 
 
-def negative_log_posterior(logs: Array, arm: LinearArm, squares: Array, reached: Reached, expected: Array) -> tuple[float, Array]:
+def spread(reached: Reached) -> Ints:
+    """Return the indices of at most 500 pairs for a fit, in their order: first of the newest world, then of the others.
+
+    If a group has too many pairs, pairs at equal distances in their order are taken.
+    """
+    newest = reached.world == reached.world.max(initial=0)
+    chosen: list[Ints] = []
+    for group in (np.flatnonzero(newest), np.flatnonzero(~newest)):
+        number = min(len(group), MAX_FITTED - sum(map(len, chosen)))
+        chosen.append(group[np.unique(np.linspace(0, len(group) - 1, number).round().astype(np.intp))])
+    return np.sort(np.concatenate(chosen))
+
+
+def negative_log_posterior(
+    logs: Array, arm: LinearArm, squares: Array, reached: Reached, expected: Array, factors: Array = ONE_WORLD
+) -> tuple[float, Array]:
     """Return the negative log posterior of the covariance parameters, up to a constant, and its derivatives (8 + d,).
 
     It is the negative logarithm of the evidence (marginal likelihood) of the rewards times the prior of the parameters. The average reward
@@ -175,13 +194,14 @@ def negative_log_posterior(logs: Array, arm: LinearArm, squares: Array, reached:
         squares: (d, S, S), from `joint_squares`.
         reached: the n pairs of state and target that were tried, with their rewards.
         expected: (n,) prior mean reward of each pair.
+        factors: (W,) of the differences of the worlds, see `worlds.scales_of`.
     """
     from scipy.linalg import cho_factor, cho_solve
 
-    chosen = np.unique(np.linspace(0, len(reached) - 1, min(len(reached), MAX_FITTED)).round().astype(np.intp))
+    chosen = spread(reached)
     seen = points(arm, reached.state[chosen], reached.places[reached.target[chosen]])
     covariance = Covariance(squares, logs)
-    matrix, slopes = covariance.with_slopes(seen, reached.count[chosen])
+    matrix, slopes = covariance.with_slopes(seen, reached.count[chosen], scales_of(reached.world[chosen], factors))
     factor = cho_factor(matrix, lower=True, overwrite_a=True, check_finite=False)
     residual = (reached.mean - expected)[chosen]
     weight = cho_solve(factor, residual, check_finite=False)
@@ -195,11 +215,12 @@ def negative_log_posterior(logs: Array, arm: LinearArm, squares: Array, reached:
     return float(value), slope
 
 
-def fitted_parameters(logs: Array, arm: LinearArm, squares: Array, reached: Reached, expected: Array) -> Array:
+def fitted_parameters(logs: Array, arm: LinearArm, squares: Array, reached: Reached, expected: Array, factors: Array = ONE_WORLD) -> Array:
     """Return the logarithms of the covariance parameters with the highest posterior, (8 + d,), by a local search.
 
     `logs`: (8 + d,), where the search begins. `arm`: gives the features of the reaches. `squares`: (d, S, S), from `joint_squares`.
     `reached`: the n pairs of state and target that were tried, with their rewards. `expected`: (n,) prior mean reward of each pair.
+    `factors`: (W,) of the differences of the worlds, see `worlds.scales_of`.
     """
     from scipy.optimize import minimize
 
@@ -207,7 +228,7 @@ def fitted_parameters(logs: Array, arm: LinearArm, squares: Array, reached: Reac
     found = minimize(
         negative_log_posterior,
         logs,
-        (arm, squares, reached, expected),
+        (arm, squares, reached, expected, factors),
         jac=True,
         method="L-BFGS-B",
         bounds=bounds,

@@ -14,9 +14,18 @@ import numpy as np
 
 from mobee.arrays import Array, Ints
 from mobee.learning.reaching.histories import forget
-from mobee.learning.reaching.predictors.covariance import Covariance, Points, default_parameters, fitted_parameters, joint_squares, points
+from mobee.learning.reaching.predictors.covariance import (
+    Covariance,
+    Points,
+    default_parameters,
+    fitted_parameters,
+    joint_squares,
+    points,
+    spread,
+)
 from mobee.learning.reaching.predictors.linear_arm import LinearArm
 from mobee.learning.reaching.predictors.observed import Reached
+from mobee.learning.reaching.predictors.worlds import ONE_WORLD, fitted_factors, scales_of
 from mobee.learning.reaching.reaches import Reaches
 
 BLOCK = 32  # rows
@@ -52,9 +61,12 @@ class Posterior:
         target: (n, 3) m, root frame, target of each pair.
         residual: (n,) average reward of each pair, minus its prior mean.
         count: (n,) number of rewards in each average.
+        scales: (n, n) factors of the covariances between the pairs, see `worlds.scales_of`; those of the present world are 1.
     """
 
-    def __init__(self, arm: LinearArm, covariance: Covariance, state: Ints, target: Array, residual: Array, count: Array) -> None:
+    def __init__(
+        self, arm: LinearArm, covariance: Covariance, state: Ints, target: Array, residual: Array, count: Array, scales: Array
+    ) -> None:
         from scipy.linalg import cholesky, solve_triangular
 
         self._arm, self._covariance, self._solve = arm, covariance, solve_triangular
@@ -67,7 +79,7 @@ class Posterior:
         if self._used:
             self._state[: self._used], self._target[: self._used] = state, target
             seen = points(arm, state, target)
-            matrix = covariance.between(seen, seen) + np.diag(covariance.noise / count)
+            matrix = covariance.between(seen, seen) * scales + np.diag(covariance.noise / count)
             factor = cholesky(matrix, lower=True, overwrite_a=True, check_finite=False)
             self._factor[: self._used, : self._used] = factor
             self._score[: self._used] = self._solve(factor, residual, lower=True, check_finite=False)
@@ -146,6 +158,7 @@ class Posterior:
 
 
 REFITS = (30, 60, 120, 250, 500, 1000)  # reaches after which the parameters of the covariance are fitted again
+COMPARED = 1.2  # factor of the number of reaches in the present world after which it is compared again with earlier ones
 MAX_PAIRS = 2500  # of state and target: 50 MB
 REPEATS = 768  # repeated reaches, or pairs beyond MAX_PAIRS, after which they are merged
 RASTER = 0.01, 1.25  # m, cell size within which targets are merged first, and its factor for each next attempt
@@ -170,7 +183,8 @@ class GaussianProcess:
         self._squares = joint_squares(reaches)
         self._covariance = Covariance(self._squares, default_parameters(reaches))
         self._arm, self._reached = LinearArm(reaches), Reached()
-        self._repeats = 0
+        self._factors = ONE_WORLD
+        self._here, self._next = 0, 1.0  # reaches in the present world, and their number at the next comparison
         self._rebuild()
 
     @property
@@ -180,14 +194,28 @@ class GaussianProcess:
 
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:
         """Learn from the reward of a reach that began in `state`, for a target (3,) m. `expected` is not used."""
-        if self._reached.pair(state, target) is not None:
+        world = len(self._factors) - 1
+        if self._reached.pair(state, target, world) is not None:
             self._repeats += 1
         self._pending.append((state, target.copy(), reward - self._arm.rewards(np.array([state]), target).item()))
-        self._reached.add(state, target, reward)
+        self._reached.add(state, target, reward, world)
+        self._here += 1
         if self._reached.tries in self._refits:
             self._fit()
+        elif world and self._here >= self._next:
+            self._compare()
         elif self._repeats >= REPEATS or len(self._posterior) + len(self._pending) >= self._size:
             self._rebuild()
+
+    def begin_world(self) -> None:
+        """Predict from now on for another world or another robot, in which all later reaches are made.
+
+        Rewards of earlier worlds still inform. Their influence depends on how much they differ from later rewards: the variance of the
+        differences is estimated after 1, 2, 3, 4, 5, 6, 8, ... reaches in the present world.
+        """
+        self._factors = np.append(self._factors, 0.0)
+        self._here, self._next = 0, 1.0
+        self._compare()
 
     def mean(self, target: Array) -> Array:
         """Return the expected reward of a reach from each state for a target (3,) m, shape (S,)."""
@@ -220,35 +248,47 @@ class GaussianProcess:
         known = self._reached
         self._arm = self._arm.fitted(known)
         expected = self._arm.rewards(known.state, known.places[known.target])
-        self._covariance = Covariance(self._squares, fitted_parameters(self._covariance.logs, self._arm, self._squares, known, expected))
+        logs = fitted_parameters(self._covariance.logs, self._arm, self._squares, known, expected, self._factors)
+        self._covariance = Covariance(self._squares, logs)
+        self._rebuild()
+
+    def _compare(self) -> None:
+        """Estimate how much the mean rewards of earlier worlds differ from those of the present one."""
+        self._next = self._here * COMPARED
+        known, chosen = self._reached, spread(self._reached)
+        state, target = known.state[chosen], known.places[known.target[chosen]]
+        seen = points(self._arm, state, target)
+        residual = known.mean[chosen] - self._arm.rewards(state, target)
+        between, noise = self._covariance.between(seen, seen), self._covariance.noise / known.count[chosen]
+        self._factors = fitted_factors(between, noise, residual, known.world[chosen], self._factors)
         self._rebuild()
 
     def _rebuild(self) -> None:
         """Make the posterior again from the averages of all pairs."""
-        state, target, mean, count = thinned(self._reached, MAX_PAIRS)
+        state, target, mean, count, world = thinned(self._reached, MAX_PAIRS)
         residual = mean - self._arm.rewards(state, target)
-        self._posterior = Posterior(self._arm, self._covariance, state, target, residual, count)
+        self._posterior = Posterior(self._arm, self._covariance, state, target, residual, count, scales_of(world, self._factors))
         self._pending: list[tuple[int, Array, float]] = []  # reaches that no query has needed yet
         self._repeats, self._size = 0, max(len(state), MAX_PAIRS) + REPEATS
 
 
-def thinned(known: Reached, most: int) -> tuple[Ints, Array, Array, Array]:
-    """Return state (n,), target (n, 3) m, average reward (n,) and number of tries (n,) of the pairs of state and target.
+def thinned(known: Reached, most: int) -> tuple[Ints, Array, Array, Array, Ints]:
+    """Return state (n,), target (n, 3) m, average reward (n,), number of tries (n,) and world (n,) of the pairs of state and target.
 
     If there are more than `most` pairs, those of the same state whose targets lie in the same cell of a cubic grid are merged into one pair
     with the average target and reward, weighted by the number of tries. The grid is made coarser until at most `most` pairs remain, or all
     targets of each state are merged; so at least one pair of each state remains.
     """
-    state, raster, step = known.state, *RASTER
+    state, world, raster, step = known.state, known.world, *RASTER
     which = np.arange(len(known))
     while len(state) > most and raster <= MAX_RASTER:
-        cell = np.column_stack([known.state, np.round(known.places[known.target] / raster)])
+        cell = np.column_stack([known.state, known.world, np.round(known.places[known.target] / raster)])
         _, first, which = np.unique(cell, axis=0, return_index=True, return_inverse=True)
-        state, raster = known.state[first], raster * step
+        state, world, raster = known.state[first], known.world[first], raster * step
     if len(state) == len(known):
-        return state, known.places[known.target], known.mean, known.count
+        return state, known.places[known.target], known.mean, known.count, world
     columns = np.column_stack([known.places[known.target], known.mean, np.ones(len(known))]) * known.count[:, None]
     sums = np.zeros((len(state), columns.shape[1]))
     np.add.at(sums, which, columns)
     averages = sums[:, :-1] / sums[:, -1:]
-    return state, averages[:, :3], averages[:, 3], sums[:, -1]
+    return state, averages[:, :3], averages[:, 3], sums[:, -1], world

@@ -18,14 +18,15 @@ IMAGINED = 4.0  # weight of these two, in pairs
 class Reached:
     """The reaches observed so far, by pair of state and target: the number, the sum and the sum of squares of the rewards of each pair.
 
-    The pairs are in the order of their first reaches.
+    The pairs are in the order of their first reaches. Reaches in different worlds, or on different robots, form different pairs: each pair
+    has the number of its world.
     """
 
     def __init__(self) -> None:
         self._target_of: dict[bytes, int] = {}
-        self._pair_of: dict[tuple[int, int], int] = {}
+        self._pair_of: dict[tuple[int, int, int], int] = {}
         self._places = np.empty((8, 3))
-        self._state, self._target = np.empty(8, dtype=np.intp), np.empty(8, dtype=np.intp)
+        self._state, self._target, self._world = (np.empty(8, dtype=np.intp) for _ in range(3))
         self._count, self._total, self._squares = np.zeros(8), np.zeros(8), np.zeros(8)
         self.tries = 0
         """Number of reaches so far; repeated ones count each time."""
@@ -49,6 +50,11 @@ class Reached:
         return self._target[: len(self)]
 
     @property
+    def world(self) -> Ints:
+        """The number of the world of each pair of state and target, shape (n,)."""
+        return self._world[: len(self)]
+
+    @property
     def count(self) -> Array:
         """The number of reaches observed for each pair of state and target, shape (n,)."""
         return self._count[: len(self)]
@@ -69,24 +75,24 @@ class Reached:
         """Return the index of a target (3,) m, root frame, in `places`; None if it was never tried."""
         return self._target_of.get(target.tobytes())
 
-    def pair(self, state: int, target: Array) -> int | None:
-        """Return the index of a pair of a state and a target (3,) m, root frame; None if the pair was never tried."""
+    def pair(self, state: int, target: Array, world: int = 0) -> int | None:
+        """Return the index of a pair of a state and a target (3,) m, root frame; None if the pair was never tried in this world."""
         known = self.find(target)
-        return None if known is None else self._pair_of.get((state, known))
+        return None if known is None else self._pair_of.get((state, known, world))
 
-    def add(self, state: int, target: Array, reward: float) -> int:
+    def add(self, state: int, target: Array, reward: float, world: int = 0) -> int:
         """Record one reach that began in `state`, for a target (3,) m in the root frame, and its reward; return the index of its pair.
 
-        A pair is a state and a target. The first reach of a pair adds the pair at the end.
+        A pair is a state and a target in one world, which is given by its number. The first reach of a pair adds the pair at the end.
         """
         key = target.tobytes()
         place = self._target_of.setdefault(key, len(self._target_of))
         self._places = grown(self._places, place)
         self._places[place] = target
-        pair = self._pair_of.setdefault((state, place), len(self._pair_of))
-        self._state, self._target = grown(self._state, pair), grown(self._target, pair)
+        pair = self._pair_of.setdefault((state, place, world), len(self._pair_of))
+        self._state, self._target, self._world = grown(self._state, pair), grown(self._target, pair), grown(self._world, pair)
         self._count, self._total, self._squares = grown(self._count, pair), grown(self._total, pair), grown(self._squares, pair)
-        self._state[pair], self._target[pair] = state, place
+        self._state[pair], self._target[pair], self._world[pair] = state, place, world
         self._count[pair] += 1.0
         self._total[pair] += reward
         self._squares[pair] += reward * reward

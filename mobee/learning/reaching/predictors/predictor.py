@@ -51,6 +51,24 @@ class RewardPredictor(Protocol):
         ...
 
 
+@runtime_checkable
+class WorldComparer(Protocol):
+    """Further interface of a predictor that estimates how far rewards from another world hold in the present one."""
+
+    def begin_world(self) -> None:
+        """Predict from now on for another world or another robot, in which all later reaches are made."""
+        ...
+
+
+def begin_world(predictor: RewardPredictor) -> None:
+    """Report to a predictor that all later reaches are made in another world, or on another robot.
+
+    A predictor that is not a `WorldComparer` treats all rewards as rewards of one world.
+    """
+    if isinstance(predictor, WorldComparer):
+        predictor.begin_world()
+
+
 KNOTS = np.linspace(0.0, 0.6, 13)  # m, distances between hand and target
 SMOOTHNESS = 2.0  # weight of equal values at neighbouring knots, in reaches
 SHRINKAGE = 0.1  # weight of the average of all rewards at each knot, in reaches

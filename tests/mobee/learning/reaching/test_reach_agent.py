@@ -305,6 +305,17 @@ def test_the_detector_starts_anew_before_and_after_practice():
     assert len(outcomes) == 3 and all(outcomes)
 
 
+@pytest.mark.parametrize("detector", ["none", "run_length"])
+def test_the_predictor_compares_the_rewards_of_practice_with_those_of_the_own_robot(detector):
+    """Before: world 0; on the other plant: 1; on the own robot again: 2."""
+    reacher = corridor(detector=detector, predictor="gp")
+    reacher.learn([GOAL], 5)
+    reacher.practise(corridor().plant, [GOAL], 7)
+    reacher.learn([GOAL], 3)
+    reached = reacher.predictor._reached
+    assert [int(reached.count[reached.world == world].sum()) for world in range(3)] == [5, 7, 3]
+
+
 def test_practice_does_not_write_into_a_store(tmp_path):
     with ReachStore(tmp_path / "steps.sqlite", "left_arm") as store:
         reacher = corridor(store=store)

@@ -12,16 +12,17 @@ from mobee.learning.reaching.predictors.covariance import (
     joint_squares,
     negative_log_posterior,
     points,
+    spread,
 )
 from mobee.learning.reaching.predictors.linear_arm import LinearArm
 from mobee.learning.reaching.predictors.observed import Reached
 from tests.mobee.learning.reaching.predictors.arms import drawn, reaches
 
 
-def known(seen) -> Reached:
+def known(seen, worlds: int = 1) -> Reached:
     reached = Reached()
-    for state, target, value in seen:
-        reached.add(state, target, value)
+    for number, (state, target, value) in enumerate(seen):
+        reached.add(state, target, value, number * worlds // len(seen))
     return reached
 
 
@@ -46,15 +47,13 @@ def test_differences_of_surprise_are_those_of_all_rewards_taken_one_by_one():
     assert merged[1] - merged[0] == pytest.approx(plain(other) - plain(first), abs=1e-8)
 
 
-def test_the_derivatives_are_those_of_the_surprise():
-    made, seen = reaches(), drawn(reaches(), 50)
-    logs, squares, step = default_parameters(made) + 0.2, joint_squares(made), 1e-5
-    _, slope = negative_log_posterior(logs, LinearArm(made), squares, known(seen), before(known(seen)))
+@pytest.mark.parametrize("factors", [np.zeros(1), np.array([0.3, 3.0, 0.0])])
+def test_the_derivatives_are_those_of_the_surprise(factors):
+    made, reached = reaches(), known(drawn(reaches(), 50), len(factors))
+    logs, step, rest = default_parameters(made) + 0.2, 1e-5, (LinearArm(made), joint_squares(made), reached, before(reached), factors)
+    _, slope = negative_log_posterior(logs, *rest)
     for axis, unit in enumerate(np.eye(len(logs))):
-        up, down = (
-            negative_log_posterior(logs + sign * step * unit, LinearArm(made), squares, known(seen), before(known(seen)))[0]
-            for sign in (1.0, -1.0)
-        )
+        up, down = (negative_log_posterior(logs + sign * step * unit, *rest)[0] for sign in (1.0, -1.0))
         assert slope[axis] == pytest.approx((up - down) / (2.0 * step), rel=1e-5, abs=1e-5)
 
 
@@ -71,3 +70,13 @@ def test_the_fit_uses_a_limited_number_of_pairs(monkeypatch):
     few, _ = negative_log_posterior(default_parameters(made), LinearArm(made), joint_squares(made), reached, before(reached))
     monkeypatch.undo()
     assert few != negative_log_posterior(default_parameters(made), LinearArm(made), joint_squares(made), reached, before(reached))[0]
+
+
+def test_a_fit_uses_all_pairs_of_the_newest_world_first(monkeypatch):
+    monkeypatch.setattr(evidence, "MAX_FITTED", 20)
+    reached = Reached()
+    for number in range(60):
+        reached.add(number % 12, np.full(3, 0.01 * number), 0.5, int(number >= 45))
+    chosen = spread(reached)
+    assert len(chosen) == 20 and set(range(45, 60)) <= set(chosen.tolist())
+    assert chosen.tolist() == sorted(chosen.tolist()) and chosen[0] == 0

@@ -9,6 +9,7 @@ from mobee.learning.reaching.predictors.covariance import Covariance, default_pa
 from mobee.learning.reaching.predictors.gaussian_process import BLOCK, GaussianProcess, thinned
 from mobee.learning.reaching.predictors.linear_arm import LinearArm
 from mobee.learning.reaching.predictors.observed import Reached
+from mobee.learning.reaching.predictors.worlds import scales_of
 from tests.mobee.learning.reaching.predictors.arms import FAR, drawn, places, reaches, taught
 
 
@@ -119,7 +120,7 @@ def test_thinned_keeps_all_tries_their_average_reward_and_their_middle():
     known, rng = Reached(), np.random.default_rng(1)
     for _ in range(300):
         known.add(int(rng.integers(4)), rng.uniform(-0.2, 0.2, 3), float(rng.random()))
-    state, target, mean, count = thinned(known, 40)
+    state, target, mean, count, _ = thinned(known, 40)
     assert len(state) <= 40
     assert count.sum() == 300
     assert count @ mean == pytest.approx(known.count @ known.mean)
@@ -131,7 +132,7 @@ def test_thinned_keeps_a_pair_of_every_state_where_there_are_more_states_than_pa
     known, rng = Reached(), np.random.default_rng(2)
     for number in range(200):
         known.add(number % 50, rng.uniform(-0.2, 0.2, 3), float(rng.random()))
-    state, _, _, count = thinned(known, 40)
+    state, _, _, count, _ = thinned(known, 40)
     assert sorted(state) == list(range(50))
     assert count.tolist() == [4.0] * 50
 
@@ -140,8 +141,88 @@ def test_thinned_leaves_few_pairs_as_they_are():
     known = Reached()
     for state, target, value in drawn(reaches(), 50):
         known.add(state, target, value)
-    state, target, mean, count = thinned(known, len(known))
+    state, target, mean, count, world = thinned(known, len(known))
     np.testing.assert_array_equal(state, known.state)
+    np.testing.assert_array_equal(world, known.world)
     np.testing.assert_array_equal(target, known.places[known.target])
     np.testing.assert_array_equal(mean, known.mean)
     np.testing.assert_array_equal(count, known.count)
+
+
+def test_reaches_in_two_worlds_with_the_same_target_stay_two_pairs_when_pairs_are_merged():
+    known = Reached()
+    for world in (0, 1):
+        for number in range(30):
+            known.add(2, np.full(3, 0.0001 * number), 0.1 + 0.8 * world, world)
+    state, _, mean, count, world = thinned(known, 10)
+    assert (state.tolist(), world.tolist()) == ([2, 2], [0, 1])
+    np.testing.assert_allclose(mean, [0.1, 0.9])
+    assert count.tolist() == [30.0, 30.0]
+
+
+def elsewhere(seen, shift, rng):
+    """The same reaches in another world, where each state has rewards of its own."""
+    own = rng.normal(0.0, shift, 1 + max(state for state, _, _ in seen))
+    return [(state, target, reward + own[state]) for state, target, reward in seen]
+
+
+def test_equal_worlds_are_recognised_and_all_their_rewards_count():
+    made, seen = reaches(), drawn(reaches(), 120)
+    one, two = (GaussianProcess(made, refits=()) for _ in range(2))
+    taught(one, seen)
+    taught(two, seen[:80])
+    two.begin_world()
+    taught(two, seen[80:])
+    assert two._factors.tolist() == [0.0, 0.0]
+    for target in places():
+        np.testing.assert_allclose(two.mean(target), one.mean(target), rtol=0, atol=1e-6)
+
+
+def test_rewards_of_another_world_count_less_than_those_of_this_one():
+    made, rng = reaches(0, 24), np.random.default_rng(5)
+    seen, held = drawn(made, 60, targets=12), drawn(made, 300, seed=0, targets=12, noise=0.0)
+    other = elsewhere(drawn(made, 300, seed=7, targets=12), 0.4, rng)
+    errors = {}
+    for name, before, here in (
+        ("one world", other, []),
+        ("compared", other, seen),
+        ("not compared", [*other, *seen], []),
+        ("alone", [], seen),
+    ):
+        process = taught(GaussianProcess(made), before)
+        if here:
+            process.begin_world()
+            taught(process, here)
+        errors[name] = np.sqrt(np.mean([(process.mean(target)[state] - value) ** 2 for state, target, value in held]))
+    assert errors["compared"] < 0.5 * errors["not compared"]
+    assert errors["compared"] < 1.1 * errors["alone"]
+
+
+def test_mean_and_deviation_after_a_change_are_those_of_the_dense_posterior_in_both_worlds():
+    made, seen = reaches(), drawn(reaches(), 90)
+    worlds = np.repeat([0, 1], [60, 30])
+    process = taught(GaussianProcess(made, refits=()), elsewhere(seen[:60], 0.5, np.random.default_rng(0)))
+    process.begin_world()
+    taught(process, seen[60:])
+    made_here = [*elsewhere(seen[:60], 0.5, np.random.default_rng(0)), *seen[60:]]
+    assert process._factors[0] > 0.0
+    covariance, arm, states = Covariance(joint_squares(made), default_parameters(made)), LinearArm(made), np.arange(len(made))
+    state, where, value = (np.array(column) for column in zip(*made_here, strict=True))
+    data, asked = points(arm, state, where), points(arm, states, places()[0])
+    matrix = covariance.between(data, data) * scales_of(worlds, process._factors) + covariance.noise * np.eye(len(seen))
+    cross = np.linalg.solve(matrix, covariance.between(data, asked))
+    mean = arm.rewards(states, places()[0]) + cross.T @ (value - arm.rewards(state, where))
+    variance = (covariance.between(asked, asked) - covariance.between(asked, data) @ cross).diagonal()
+    np.testing.assert_allclose(process.mean(places()[0]), mean, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(process.deviation(places()[0]), np.sqrt(variance), rtol=0, atol=1e-8)
+
+
+def test_a_world_without_reaches_changes_no_prediction():
+    made, seen = reaches(), drawn(reaches(), 50)
+    process, fresh = taught(GaussianProcess(made), seen), GaussianProcess(made)
+    before = process.mean(places()[0])
+    for one in (process, fresh):
+        one.begin_world()
+        one.begin_world()
+    np.testing.assert_allclose(process.mean(places()[0]), before, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(fresh.mean(places()[0]), GaussianProcess(made).mean(places()[0]))
