@@ -89,7 +89,7 @@ class Watch:
 
         `kinds`: kinds of contacts that count as violations, of "solid" and "field". `tolerance`: rad, how far a pose may be beyond a limit
         or a clause without a violation, because encoders are noisy; for a motor that slides it is multiplied by its
-        `mobee.robot.motor_units.fine_units`.
+        `mobee.robot.motor_units.fine_units`, also in clauses.
         """
         if unknown := set(kinds) - set(KINDS):
             raise InvalidValue(f"kinds {sorted(unknown)}: contacts are of the kinds {', '.join(KINDS)}")
@@ -98,6 +98,7 @@ class Watch:
         self._kinds, self._tolerance = frozenset(kinds), tolerance
         self._motors, self._limits, self._units = robot.motors, robot.limits, fine_units(robot)
         self._rows = stack_clauses(robot.clauses, len(robot.motors))
+        self._row_tolerances = tolerance * np.linalg.norm(self._rows.a * self._units, axis=1) / self._rows.norms
         self._clauses = [f"{clause.part} clause {i}" for i, clause in enumerate(robot.clauses)]
 
     def check(self, pose: Pose) -> tuple[Violation, ...]:
@@ -114,8 +115,9 @@ class Watch:
         rows = self._rows
         if not len(rows.b):
             return []
-        lack = np.minimum.reduceat(-(rows.a @ pose.q + rows.b) / rows.norms, rows.starts)
-        return [Violation("clause", self._clauses[i], float(lack[i])) for i in np.flatnonzero(lack > self._tolerance)]
+        each = -(rows.a @ pose.q + rows.b) / rows.norms
+        lack, beyond = (np.minimum.reduceat(distance, rows.starts) for distance in (each, each - self._row_tolerances))
+        return [Violation("clause", self._clauses[i], float(lack[i])) for i in np.flatnonzero(beyond > 0.0)]
 
 
 State = Literal["forward", "brake", "rewind", "dead", "stuck"]

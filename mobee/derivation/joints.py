@@ -21,10 +21,10 @@ TURN = 2.0 * np.pi
 
 
 def bounded(robot: Robot) -> tuple[Robot, list[str]]:
-    """Limit every motor with a range of a turn or more to half a turn to each side; return the robot and the names of the changed motors.
+    """Limit every motor with a range of more than a turn to one turn; return the robot and the names of the changed motors.
 
     With a larger range, positions one turn apart are the same pose, so that several states of a lattice would be the same pose. The middle
-    of the new range is 0, or home if home is not within half a turn of 0. The new range is then clipped to the old one.
+    of the new range is 0, or home if home is not within half a turn of 0; or the nearest place from which the turn is within the old range.
     """
     changed = [motor.name for motor in robot.motor_table if np.ptp(motor.limits) >= TURN - 1e-6 and not slides(robot, motor)]
     table = []
@@ -32,7 +32,9 @@ def bounded(robot: Robot) -> tuple[Robot, list[str]]:
         if motor.name in changed:
             scale = max(abs(scale) for _, scale, _ in motor.joints)
             centre = motor.home if abs(motor.home) > np.pi / scale else 0.0
-            limits = np.clip(centre + np.array([-np.pi, np.pi]) / scale, *motor.limits)
+            low, high = motor.limits
+            centre = float(np.clip(centre, low + np.pi / scale, max(high - np.pi / scale, low + np.pi / scale)))
+            limits = np.clip(centre + np.array([-np.pi, np.pi]) / scale, low, high)
             motor = replace(motor, limits=limits, home=float(np.clip(motor.home, *limits)))
         table.append(motor)
     narrowed = [name for name, one, other in zip(robot.motors, robot.motor_table, table, strict=True) if np.any(one.limits != other.limits)]

@@ -170,7 +170,8 @@ class EdgeWatch:
         old, new = self._seen, self._model.world.snapshot
         self._seen = new
         changed = _changed(old, new)
-        if any(one.link is not None for one in changed):
+        carries = any(one.link is not None for snapshot in (old, new) for one in snapshot.objects.values())
+        if changed and carries:  # `near` knows the robot's own shapes only
             near = np.ones(len(self._edges), dtype=np.bool_)
         else:
             near = np.zeros(len(self._edges), dtype=np.bool_)

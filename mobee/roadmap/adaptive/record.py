@@ -128,13 +128,13 @@ class MapRecord:
         """Change the roadmap and record the change; return the result of the method.
 
         `what`: name of the method of AdaptiveRoadmap, "grow", "join" or "prune". `given`: its arguments, plain JSON values. Raises
-        UnknownName for another method.
+        UnknownName for another method. A change that the roadmap refuses is not recorded.
         """
         if what not in CHANGES:
             raise UnknownName("change of a map", what, CHANGES)
+        result = self._apply(what, given)
         if self._store is not None:
             self._store.changed(what, **given)
-        result = self._apply(what, given)
         if what == "prune":
             self.on_renumbered(result)
         return result

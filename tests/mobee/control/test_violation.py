@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,11 @@ from mobee.arrays import Array
 from mobee.control.reflex import Violation, Watch
 from mobee.errors import InvalidValue
 from mobee.model.pose import Pose
+from mobee.robot.motor_units import fine_units
+from mobee.robot.robot import Clause
+from tests.mobee.control.test_slides import SLIDING
 
+SLIDE_CLAUSE = Clause("arm", np.array([[0.0, -1.0, 0.0]]), np.array([0.01]))  # the slide at most at 1 cm
 ROBOT = load_robot("icub")
 MODEL = Model(ROBOT, load_world("table"))
 
@@ -46,6 +52,17 @@ def test_a_limit_counts_beyond_the_tolerance() -> None:
     (found,) = watch.check(posture(neck_yaw=lower - 3.0))
     assert (found.kind, found.what) == ("limit", "neck_yaw")
     assert found.depth == pytest.approx(np.deg2rad(3.0))
+
+
+def test_a_clause_of_a_slide_is_checked_as_precisely_as_its_limit() -> None:
+    """A slide of 6 cm: 1 rad would be 1 m for it, so the tolerance of 2 degrees would be 3.5 cm."""
+    motor = replace(SLIDING.motor_table[1], limits=np.array([-0.03, 0.03]))
+    robot = replace(SLIDING, motor_table=(SLIDING.motor_table[0], motor, SLIDING.motor_table[2]), clauses=(SLIDE_CLAUSE,))
+    tolerance = np.deg2rad(2.0) * fine_units(robot)[1]
+    model, watch = Model(robot), Watch(robot, kinds=(), tolerance=np.deg2rad(2.0))
+    assert watch.check(model.evaluate(np.array([0.0, 0.01 + 0.9 * tolerance, 0.0]))) == ()
+    (found,) = watch.check(model.evaluate(np.array([0.0, 0.01 + 1.1 * tolerance, 0.0])))
+    assert (found.kind, found.what) == ("clause", "arm clause 0")
 
 
 def test_a_clause_is_broken_when_none_of_its_rows_is_satisfied() -> None:

@@ -78,13 +78,24 @@ def test_parts_and_fields_of_a_file_stay(name: str) -> None:
         assert [(arm.part, len(arm.motors)) for arm in derived.arms] == [("arm", 5)]
 
 
-def test_a_joint_that_turns_without_end_gets_half_a_turn_to_each_side(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("low", "high", "expected"),
+    [
+        (-6.3, 6.3, (-np.pi, np.pi)),
+        (-0.1, 6.3, (-0.1, 2.0 * np.pi - 0.1)),
+        (-9.0, 0.1, (0.1 - 2.0 * np.pi, 0.1)),
+        (0.0, 6.3, (0.0, 2.0 * np.pi)),
+    ],
+)
+def test_a_joint_with_a_range_of_more_than_a_turn_gets_one_turn_of_it(
+    tmp_path: Path, low: float, high: float, expected: tuple[float, float]
+) -> None:
     path = tmp_path / "limbs.urdf"
     urdf(tmp_path, limb("shoulder", 0.0, 0.3, 0.0))
-    path.write_text(path.read_text().replace('lower="-1.5" upper="1.5"', 'lower="-6.3" upper="6.3"'))
+    path.write_text(path.read_text().replace('lower="-1.5" upper="1.5"', f'lower="{low}" upper="{high}"'))
     derived = derive(load_robot(path))
     assert derived.limited == derived.robot.motors
-    assert derived.robot.limits == pytest.approx(np.tile([-np.pi, np.pi], (3, 1)))
+    assert derived.robot.limits == pytest.approx(np.tile(expected, (3, 1)))
 
 
 def test_home_is_moved_out_of_contact(tmp_path: Path) -> None:

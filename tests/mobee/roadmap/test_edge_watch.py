@@ -70,6 +70,18 @@ def test_a_ghost_made_solid_counts_and_so_does_a_carried_object(model: mobee.Mod
         np.testing.assert_array_equal(watch.free, check_edges(model, poses, EDGES, STEP))
 
 
+def test_what_a_carried_object_may_touch_is_checked_again(model: mobee.Model, poses: np.ndarray) -> None:
+    """A pole reaches from the hand to where no shape of the robot is near; a block appears at its end."""
+    pose = model.evaluate(poses[0])
+    palm, along = pose.position("right_palm"), pose.rotation("right_palm")[:, 2]
+    model.world.add("pole", mobee.capsule(0.01, 0.8), position=palm + 0.45 * along, rotation=pose.rotation("right_palm"))
+    model.attach("pole", "r_hand", poses[0])
+    watch = EdgeWatch(model, poses, EDGES, STEP)
+    model.world.add("block", mobee.sphere(0.05), position=palm + 0.8 * along)
+    watch.update()
+    np.testing.assert_array_equal(watch.free, check_edges(model, poses, EDGES, STEP))
+
+
 def test_the_distance_from_a_volume_is_exact() -> None:
     world = mobee.World()
     for name, shape in (

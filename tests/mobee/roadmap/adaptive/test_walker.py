@@ -114,6 +114,15 @@ def test_an_explorer_that_is_started_again_continues_with_its_map(tmp_path):
     assert len(again.roadmap.unexplored) == 0
 
 
+def test_a_change_that_the_map_refuses_is_not_recorded(tmp_path):
+    """It would be refused again at every start."""
+    explorer = MapExplorer(square(), BlockedPlant(A, wall(A, B)), store=MapStore(tmp_path / "map.sqlite", "arm"))
+    with pytest.raises(mobee.InvalidValue, match="at least one finite pose"):
+        explorer.record.change("grow", samples=[[0.5, 0.5]], neighbours=2)
+    again = MapExplorer(square(), BlockedPlant(A, wall(A, B)), store=MapStore(tmp_path / "map.sqlite", "arm"))
+    assert len(again.roadmap) == 4
+
+
 def test_a_store_of_another_map_is_refused(tmp_path):
     plant = BlockedPlant(A, wall(A, B))
     Walker(square(), plant, store=MapStore(tmp_path / "map.sqlite", "arm")).go(1)
