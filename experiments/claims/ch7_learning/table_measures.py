@@ -401,20 +401,27 @@ class Judged:
         return found
 
 
-def dependent(runs: Runs, parts: Sequence[str], but: int) -> NDArray[np.bool_]:
-    """Return which actions (S, A) of these parts depend on other parts: their outcomes differ at the table and at its ghost.
+def dependent(runs: Runs, parts: Sequence[str]) -> dict[int, NDArray[np.bool_]]:
+    """Return a dict from each seed to the actions (S, A) of these parts that depend on other parts, according to all other seeds.
 
-    The ghost exerts no force.  Outcomes differ if their total variation is more than 0.1.  The outcomes are counted in the runs of all
-    explorers and of all seeds except `but`.  `parts`: parts with the same graph, counted together.
+    These actions have different outcomes at the table and at its ghost, which exerts no force.  Outcomes differ if their total variation is
+    more than 0.1.  The outcomes are counted in the runs of all explorers.  `parts`: parts with the same graph, counted together.
     """
-    shares = []
+    shape = (*spaces()[parts[0]].goals.shape, len(spaces()[parts[0]]))
+    counts: dict[str, dict[int, Array]] = {}  # (S, A, S), by world and seed
     for world in ("table", "ghost"):
-        others = [run for explorer in EXPLORERS for run in runs.get((explorer, world), []) if run.seed != but]
-        empty = np.zeros((*spaces()[parts[0]].goals.shape, len(spaces()[parts[0]])))
-        counts = sum((run.ends[part] for run in others for part in parts), start=empty)
-        shares.append(counts / np.maximum(counts.sum(axis=-1, keepdims=True), 1.0))
-    different: NDArray[np.bool_] = 0.5 * np.abs(shares[0] - shares[1]).sum(axis=-1) > DIFFERENT
-    return different
+        for run in (run for explorer in EXPLORERS for run in runs.get((explorer, world), [])):
+            of_seed = counts.setdefault(world, {})
+            of_seed[run.seed] = of_seed.get(run.seed, np.zeros(shape)) + sum(run.ends[part] for part in parts)
+    totals = {world: sum(of_seed.values(), start=np.zeros(shape)) for world, of_seed in counts.items()}
+
+    def shares(world: str, seed: int) -> Array:
+        others = totals[world] - counts[world].get(seed, 0)
+        found: Array = others / np.maximum(others.sum(axis=-1, keepdims=True), 1.0)
+        return found
+
+    seeds = sorted(set().union(*counts.values()))
+    return {seed: 0.5 * np.abs(shares("table", seed) - shares("ghost", seed)).sum(axis=-1) > DIFFERENT for seed in seeds}
 
 
 def judged_of(runs: Runs, explorer: str, learner: str, score: str) -> list[Judged]:
@@ -424,9 +431,10 @@ def judged_of(runs: Runs, explorer: str, learner: str, score: str) -> list[Judge
     parts is found in the runs of all other seeds (`dependent`).  A run is left out if no such action is found, if there are no other seeds,
     or if there is no run at the ghost with the same seed.
     """
-    found = []
-    for run, ghost in with_ghosts(runs, explorer):
-        truth = dependent(runs, LEARNERS[learner], run.seed)
+    found, pairs = [], with_ghosts(runs, explorer)
+    depends = dependent(runs, LEARNERS[learner]) if pairs else {}
+    for run, ghost in pairs:
+        truth = depends[run.seed]
         if truth.any():
             ranked = (SCORES[score](run, ghost, part) for part in LEARNERS[learner])
             found.append(Judged(np.array([truth.ravel()[np.argsort(-values, axis=None, kind="stable")] for values in ranked])))
