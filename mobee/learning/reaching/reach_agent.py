@@ -10,6 +10,7 @@ import numpy as np
 
 from mobee.arrays import Array
 from mobee.errors import ActionInterrupted, InvalidValue
+from mobee.learning.object_space import ObjectSpace
 from mobee.learning.reaching.evaluation import Evaluation, evaluate, move, reach
 from mobee.learning.reaching.learner import ReachLearner, ReachSettings
 from mobee.learning.reaching.planning import REACH, ReachPlan, plan_reach
@@ -49,7 +50,7 @@ class ReachAgent(ReachLearner):
 
     Raises:
         UnknownName: no such setting, predictor, strategy, value of the setting `failures`, detector, or marker.
-        InvalidValue: a plant of another robot, or a value out of range.
+        InvalidValue: a plant of another robot, an `ObjectSpace`, or a value out of range.
         MobeeError: the store holds reaches of another space, marker or scale.
     """
 
@@ -69,6 +70,8 @@ class ReachAgent(ReachLearner):
         **changes: Any,
     ) -> None:
         _require_robot(space, plant)
+        if isinstance(space, ObjectSpace):
+            raise InvalidValue(f"{space}: a reach agent does not perceive objects. Give it the postures alone, `space.postures`.")
         chosen = ReachSettings.made(settings, changes)
         scale = chosen.scale
         reaches = reaches_of(space, marker, scale) if hands is None else Reaches(space.samples, hands, scale, jacobians)

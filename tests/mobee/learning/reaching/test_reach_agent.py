@@ -5,6 +5,8 @@ import numpy as np
 import pytest
 
 from mobee.errors import ActionInterrupted, InvalidValue, MobeeError, UnknownName
+from mobee.learning.grid import Grid
+from mobee.learning.object_space import ObjectSpace
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.reaching.store import ReachStore
 from mobee.learning.reaching.tabular import ReachTable
@@ -272,6 +274,12 @@ def test_a_plant_of_another_robot_is_refused():
         ReachAgent(SPACE, on, marker="hand", hands=HANDS)
     with pytest.raises(InvalidValue, match="make both from one robot"):
         agent().practise(on, TARGETS, 1)
+
+
+def test_a_space_with_an_object_is_refused():
+    space = ObjectSpace(ROW, Grid((0.0, 0.1), (0.0, 0.1), (2, 2)), "cup")
+    with pytest.raises(InvalidValue, match=r"Give it the postures alone, `space\.postures`"):
+        ReachAgent(space, corridor().plant, marker="hand", hands=HANDS)
 
 
 def test_practice_on_another_plant_is_learned_and_moves_the_own_robot_not_at_all():
