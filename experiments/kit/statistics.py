@@ -72,9 +72,10 @@ def level_of_each(looks: int) -> float:
 def error_rate(decide: Callable[[], Found], key: Callable[[Found], object] = lambda found: found) -> tuple[Found, float | None]:
     """Return the result of `decide` with 95 % intervals, and the smallest error rate in RATES at which the result does not change.
 
-    The error rate of an interval is one minus its confidence level: wider intervals have smaller rates.  `decide` is called again with
-    other levels to find the rate.  It is the p value of the decision, rounded up to one of RATES; if the result needs several intervals,
-    it is the largest of their p values.  It is None if `decide` computes no interval.  `key`: results with equal keys count as the same.
+    The error rate of an interval is one minus its confidence level: wider intervals have smaller rates.  The returned rate is the p value
+    of the decision, rounded up to one of RATES; if the result needs several intervals, it is the largest of their p values.  It is None if
+    `decide` computes no interval.  To find the rate, this function calls `decide` several times; meanwhile the functions of this module
+    that compute intervals use another confidence level (`decision_level`).  `key`: results with equal keys count as the same.
     """
     samples: dict[tuple[object, ...], Array] = {}  # intervals of all levels are quantiles of the same samples
 

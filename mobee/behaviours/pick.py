@@ -313,7 +313,12 @@ class Picker:
         return True
 
     def _motion_to(self, thing: Upright, places: Sequence[Array], slipped: Array, held: Model) -> _Motion | None:
-        """Return the motion to the first place at which the law pushes little, or else that with the smallest push; None without one."""
+        """Return the motion that puts the thing down at one of `places`; None if no place has a motion without contacts.
+
+        The control law pushes the robot away from obstacles. The first place is chosen at which this force is at most LITTLE_PUSH in the
+        postures above and at the place, or else the place with the smallest force. `slipped`: (3,) m, how the thing has slipped in the
+        hand, in the frame of the palm. `held`: model with the thing in the hand.
+        """
         here, grasp = self.body.q, self.grasp
         best: tuple[float, _Motion] | None = None
         for place in places:

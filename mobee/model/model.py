@@ -65,9 +65,10 @@ class Model:
     def hand(self, marker: str) -> Hand:
         """Return the hand of a marker: the links whose contacts with targets are ignored while the marker reaches; raises UnknownName.
 
-        These are the marker's link and all links that it carries. If the marker at home is inside fields (volumes that cause repulsive
-        forces) of earlier links of the same part, contacts of further fields with targets are ignored: the fields of one of these links,
-        the nearest to the base, and the fields of all links that it carries.
+        These are the marker's link and all links that it carries. But the fields (volumes that cause repulsive forces) of links before the
+        marker's link, such as the forearm, may be so large that the marker is inside them when the robot is at home. Of these links of the
+        marker's part, take the one that is nearest to the base: the contacts of its fields with targets are ignored too, and those of the
+        fields of all links that it carries.
         """
         known = self._hand_of.get(marker)
         if known is None:

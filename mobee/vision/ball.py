@@ -125,7 +125,10 @@ def _cone(rays: Array) -> tuple[Array, float]:
 
 
 def _arc(rays: Array, direction: Array) -> float:
-    """Return the share of the sectors around the axis that contain a ray."""
+    """Return how much of a circle an outline covers: the share of SECTORS equal sectors around `direction` that contain a ray, 0 to 1.
+
+    `rays`: (m, 3) unit vectors from the camera to points of the outline. `direction`: (3,) unit vector to the middle of the circle.
+    """
     side = np.cross(direction, (0.0, 1.0, 0.0))
     up = np.cross(direction, side)
     around = np.arctan2(rays @ up, rays @ side)

@@ -429,7 +429,10 @@ class Gate:
         return self._begun[-ago] if ago <= len(self._begun) else now
 
     def _check_delay(self, delay: int) -> None:
-        """Refuse an order that was delayed for too long although no ticks have passed, because this process did not run."""
+        """Raise Refused if the tick that an order answers began too long ago; not in lockstep.
+
+        `delay`: ns since then. The age in ticks does not show this if this process itself was frozen, and made no ticks meanwhile.
+        """
         if self._ttl_ticks is None and delay > 1e9 * MAX_AGE * self._stretch:
             raise Refused("age", f"{self.part}: answers a tick that began {delay / 1e6:.0f} ms ago, limit {MAX_AGE * 1e3:.0f} ms")
 

@@ -220,7 +220,11 @@ def _struct(cls: type[Struct]) -> StructType:
 
 
 def main() -> None:
-    """Send random messages, calls and tokens, and print their numbers; the command line has endpoint, seed, count and parts (JSON)."""
+    """Send random messages, calls and liveliness tokens to a live system, and print as JSON how many of each were sent.
+
+    Arguments of the command line: address of the router, seed, number of messages, and a JSON object with the number of
+    motors of each part.
+    """
     endpoint, seed, count, parts = sys.argv[1:]
     print(json.dumps(send(endpoint, int(seed), int(count), json.loads(parts))))
 

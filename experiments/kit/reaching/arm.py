@@ -172,8 +172,8 @@ def learned_transitions(plant: OfflinePlant, seed: int, transitions: int = TRANS
 def reach_agent(plant: ReachPlant, model: TransitionModel, seed: int, law: str = "default") -> ReachAgent:
     """Return the reach learner: it predicts rewards by a Gaussian process, and remembers failed transitions for each target position.
 
-    `model`: transition model that the agent continues to learn (thesis 9.4.1).  `seed`: seed of the agent.  `law`: "default" with today's
-    robot, or "published" with the robot of 2014.
+    `model`: transition model that the agent continues to learn (thesis 9.4.1).  `seed`: seed of the agent.  `law`: the control law of the
+    plant: "default" (and today's robot), or "published" (and the robot of 2014).
     """
     where = {"hands": hands(law), "jacobians": jacobians(law)}
     return LEARNERS["gp-ucb"].agent(space(law), plant, marker=MARKER, model=model, seed=seed, **where)

@@ -222,7 +222,12 @@ class FrontierBuilder:
         return cost, valid
 
     def _commit(self, number: int, postures: Array, points: Array, cost: Array) -> None:
-        """Add the cheapest sample of a search that the present frontier accepts, and end the search."""
+        """Add the result of a search to the map, and end the search; if no sample is accepted, do nothing.
+
+        The result is the sample with the lowest cost among those that the frontier accepts, which now may have more vertices than when the
+        search began. `number`: of the search. Its samples: `postures` (P, d), as fractions of the ranges of the free motors; `points`
+        (P, m), their task coordinates; `cost` (P,), infinite for samples that are not valid.
+        """
         for k in np.argsort(cost, kind="stable"):
             if not np.isfinite(cost[k]):
                 return
