@@ -128,7 +128,8 @@ class MapRecord:
         """Change the roadmap and record the change; return the result of the method.
 
         `what`: name of the method of AdaptiveRoadmap, "grow", "join" or "prune". `given`: its arguments, plain JSON values. Raises
-        UnknownName for another method. A change that the roadmap refuses is not recorded.
+        UnknownName for another method. A change that the roadmap refuses is not recorded. If the store cannot be written, the roadmap has
+        changed already: make roadmap and record again from the store.
         """
         if what not in CHANGES:
             raise UnknownName("change of a map", what, CHANGES)

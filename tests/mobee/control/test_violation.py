@@ -55,7 +55,7 @@ def test_a_limit_counts_beyond_the_tolerance() -> None:
 
 
 def test_a_clause_of_a_slide_is_checked_as_precisely_as_its_limit() -> None:
-    """A slide of 6 cm: 1 rad would be 1 m for it, so the tolerance of 2 degrees would be 3.5 cm."""
+    """The slide has a range of 6 cm. If 1 rad counted as 1 m, a tolerance of 2 degrees would be 3.5 cm."""
     motor = replace(SLIDING.motor_table[1], limits=np.array([-0.03, 0.03]))
     robot = replace(SLIDING, motor_table=(SLIDING.motor_table[0], motor, SLIDING.motor_table[2]), clauses=(SLIDE_CLAUSE,))
     tolerance = np.deg2rad(2.0) * fine_units(robot)[1]

@@ -166,10 +166,11 @@ PRIOR_DEVIATION = 1.0  # of the logarithm of a parameter around its default
 MAX_STEPS = 40  # of the search
 
 
-def spread(reached: Reached) -> Ints:
-    """Return the indices of at most 500 pairs for a fit, in their order: first of the newest world, then of the others.
+def fitted_pairs(reached: Reached) -> Ints:
+    """Return the indices, ascending, of the pairs of state and target that a fit uses: at most MAX_FITTED (500).
 
-    If a group has too many pairs, pairs at equal distances in their order are taken.
+    Pairs of the newest world are taken first; the other worlds get what is left of the number. From a group with too many pairs, pairs at
+    equal distances in the order of their first tries are taken.
     """
     newest = reached.world == reached.world.max(initial=0)
     chosen: list[Ints] = []
@@ -198,7 +199,7 @@ def negative_log_posterior(
     """
     from scipy.linalg import cho_factor, cho_solve
 
-    chosen = spread(reached)
+    chosen = fitted_pairs(reached)
     seen = points(arm, reached.state[chosen], reached.places[reached.target[chosen]])
     covariance = Covariance(squares, logs)
     matrix, slopes = covariance.with_slopes(seen, reached.count[chosen], scales_of(reached.world[chosen], factors))

@@ -18,10 +18,10 @@ from mobee.learning.reaching.predictors.covariance import (
     Covariance,
     Points,
     default_parameters,
+    fitted_pairs,
     fitted_parameters,
     joint_squares,
     points,
-    spread,
 )
 from mobee.learning.reaching.predictors.linear_arm import LinearArm
 from mobee.learning.reaching.predictors.observed import Reached
@@ -255,7 +255,7 @@ class GaussianProcess:
     def _compare(self) -> None:
         """Estimate how much the mean rewards of earlier worlds differ from those of the present one."""
         self._next = self._here * COMPARED
-        known, chosen = self._reached, spread(self._reached)
+        known, chosen = self._reached, fitted_pairs(self._reached)
         state, target = known.state[chosen], known.places[known.target[chosen]]
         seen = points(self._arm, state, target)
         residual = known.mean[chosen] - self._arm.rewards(state, target)

@@ -315,7 +315,7 @@ def test_the_detector_starts_anew_before_and_after_practice():
 
 @pytest.mark.parametrize("detector", ["none", "run_length"])
 def test_the_predictor_compares_the_rewards_of_practice_with_those_of_the_own_robot(detector):
-    """Before: world 0; on the other plant: 1; on the own robot again: 2."""
+    """World 0 is the one before practice, 1 the other plant, and 2 the own robot after practice."""
     reacher = corridor(detector=detector, predictor="gp")
     reacher.learn([GOAL], 5)
     reacher.practise(corridor().plant, [GOAL], 7)

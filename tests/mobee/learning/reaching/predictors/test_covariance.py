@@ -8,11 +8,11 @@ from mobee.learning.reaching.predictors import covariance as evidence
 from mobee.learning.reaching.predictors.covariance import (
     Covariance,
     default_parameters,
+    fitted_pairs,
     fitted_parameters,
     joint_squares,
     negative_log_posterior,
     points,
-    spread,
 )
 from mobee.learning.reaching.predictors.linear_arm import LinearArm
 from mobee.learning.reaching.predictors.observed import Reached
@@ -77,6 +77,6 @@ def test_a_fit_uses_all_pairs_of_the_newest_world_first(monkeypatch):
     reached = Reached()
     for number in range(60):
         reached.add(number % 12, np.full(3, 0.01 * number), 0.5, int(number >= 45))
-    chosen = spread(reached)
+    chosen = fitted_pairs(reached)
     assert len(chosen) == 20 and set(range(45, 60)) <= set(chosen.tolist())
     assert chosen.tolist() == sorted(chosen.tolist()) and chosen[0] == 0
