@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import secrets
 import threading
+import time
 from collections.abc import Callable
 
 import numpy as np
@@ -13,6 +14,8 @@ from bus_schema import VERSION, keys
 from bus_schema.messages import Clock, Motion
 from bus_schema.rpc import Done, Goal, Started, Take, Taken, WithEpoch
 from tests.services.harness import Refusal, Rig
+
+RESTART = 0.3  # s from the end of a controller to its successor
 
 
 class FakeController:
@@ -58,9 +61,13 @@ class FakeController:
             self.resume()
 
     def restart(self) -> None:
-        """Act as a controller that was restarted: another instance, and no part has an owner."""
-        self.rig.drop_token("controller", self.instance)
+        """Act as a controller that was restarted: silent for a while, then another instance, and no part has an owner.
+
+        Without the silence a service could receive the first `Motion` of the new controller before it knows that the old one has ended.
+        """
         with self._lock:
+            self.rig.drop_token("controller", self.instance)
+            time.sleep(RESTART)
             self.instance = f"c{self.epoch}"
             self.epoch, self.owner = self.epoch + 1000, ""
             self.resume()

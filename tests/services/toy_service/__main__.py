@@ -61,12 +61,12 @@ def backlog(service: Service) -> None:
 def starve(service: Service) -> None:
     """Other programs take the processor for five seconds; the toy gets the rest."""
     cpu = min(os.sched_getaffinity(0))
+    spin = f"import os, time; os.sched_setaffinity(0, {{{cpu}}}); end = time.monotonic() + 5\nwhile time.monotonic() < end: pass"
+    for _ in range(6):  # before this process yields to them: Popen waits for a child that has the priority of its parent
+        subprocess.Popen([sys.executable, "-c", spin])
     for thread in map(int, os.listdir("/proc/self/task")):
         os.sched_setaffinity(thread, {cpu})
         os.sched_setscheduler(thread, os.SCHED_IDLE, os.sched_param(0))
-    spin = f"import os, time; os.sched_setaffinity(0, {{{cpu}}}); end = time.monotonic() + 5\nwhile time.monotonic() < end: pass"
-    for _ in range(6):
-        subprocess.Popen([sys.executable, "-c", spin], preexec_fn=lambda: os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0)))
 
 
 SLOW = {"hang": hang, "backlog": backlog, "starve": starve}
