@@ -26,7 +26,7 @@ changes by a generalised likelihood ratio of two windows, and the fourth by the 
 last change).  The fifth has the same detector as the fourth, and also sees.  It sees its hand after each action, with an error of 5 mm
 along each axis (standard deviation); from these positions its plant corrects the encoders (`mobee.vision.calibration.self_calibration`).
 During evaluations it does not see the hand, because they measure what it knew before.  It also sees an object that appears or has moved,
-with an error of 1 cm along each axis, and of 5 mm in the radius of a ball.  Then it first makes 300 problem-tries on a simulated robot in
+with an error of 1 cm along each axis, and of 5 mm in the radius of a ball.  Then it first makes 1000 problem-tries on a simulated robot in
 the world as it is seen (`ReachAgent.practise`); they do not count among the 60.  The simulator is that of the robot itself, so that only
 the errors of the object and the noise differ: this shows what perception is worth, not what a wrong model of the robot costs.  All learners
 are judged by the true place of the hand.
@@ -75,7 +75,7 @@ BALLS = (  # m, root frame
 )  # fmt: skip
 RAISED = 0.08  # m
 SEEN, SEEN_RADIUS = 0.01, 0.005  # m, standard deviations of the errors along each axis, and of a radius, of an object that is seen
-PRACTICE = 300  # problem-tries in the world as it is seen, after an object has appeared or moved
+PRACTICE = 1000  # problem-tries in the world as it is seen, after an object has appeared or moved
 TURN = np.deg2rad(5.0)
 TURNS = dict(zip(RIGHT, (TURN * np.array([1.0, -1.0, 1.0, -1.0])).tolist(), strict=True))  # rad, true minus measured, by motor
 SEEDS = 10

@@ -15,7 +15,7 @@ that controller and model have wrong angles too.
 
 The learner is evaluated once as it is, without knowledge of the change.  Its eyes and its practice are those of the fifth learner of
 changed-worlds.  It sees its hand with an error of 5 mm, and an object that appeared or moved with errors of 1 cm (5 mm in a ball's radius);
-it then makes 300 tries on the offline plant in the world as it is seen.  That plant is not the robot here, which has physics: its motors
+it then makes 1000 tries on the offline plant in the world as it is seen.  That plant is not the robot here, which has physics: its motors
 are only similar, and contacts do not stop it.  Then the learner makes 60 live tries, and is evaluated twice.
 
 The oracle knows the reward of one reach from each state for each target, and which transitions failed in at least one of two tries without

@@ -215,7 +215,6 @@ class GaussianProcess:
         """
         self._factors = np.append(self._factors, 0.0)
         self._here, self._next = 0, 1.0
-        self._compare()
 
     def mean(self, target: Array) -> Array:
         """Return the expected reward of a reach from each state for a target (3,) m, shape (S,)."""
