@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Opens the SQLite file of a run, and converts SQLite errors into MobeeErrors with a message of one line."""
+"""Opens the SQLite file of a run, and converts SQLite errors into MobeeErrors with a message of one line.
+
+In a run one or several agents learn; the file holds what they have recorded, such as transitions and reaches.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +40,7 @@ REMEDIES = {
 
 
 def opened(path: Path, read_only: bool, durable: bool = True) -> sqlite3.Connection:
-    """Open the SQLite file of a run and return the connection; a new file gets its tables.
+    """Open the SQLite file with the data of the agents of a run and return the connection; a new file gets its tables.
 
     A file that is damaged, or was written by another program or with another schema, is refused and not changed. `read_only`: nothing
     is written to the file or beside it, and a file without tables is refused too. `durable`: True: a commit waits for the disk and

@@ -28,7 +28,7 @@ class InvalidValue(MobeeError, ValueError):
 
 
 class UnknownName(MobeeError, KeyError):
-    """Raised for a name that the robot, the world or a table does not have; the message has the nearest name and all valid names."""
+    """Raised for an unknown name, e.g. of a motor, object or method; the message has all valid names, and a similar one if there is one."""
 
     def __init__(self, kind: str, given: object, valid: Iterable[object]) -> None:
         names = sorted(map(str, valid))
@@ -57,7 +57,7 @@ class ActionInterrupted(MobeeError):
 
 
 class BatchInterrupted(ActionInterrupted):
-    """Raised if some plants of a batch were interrupted or failed; the other plants ended normally.
+    """Raised if some plants (simulated robots) of a batch were interrupted or failed; the other plants ended normally.
 
     `results`: the result of each plant, or the exception that ended it, in the order of the plants.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The Plant: the interface through which agents act, offline and live, and the outcome of an action."""
+"""The Plant: the interface through which agents act on a robot, offline (simulated) or in the live system, and the outcome of an action."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Outcome:
 
 
 class Plant(Protocol):
-    """A robot that an agent acts on, offline or live."""
+    """A robot that an agent acts on: offline (simulated in one process) or live (in the system of processes on a message bus)."""
 
     robot: Robot
 
@@ -45,14 +45,16 @@ class Plant(Protocol):
     def act(self, part: str, target: Array) -> Outcome:
         """Set the part's attractor to `target` (n_part,) rad and wait until the part has settled, or a time limit is over (thesis 6.1).
 
-        Raises ActionInterrupted if the action ends without an outcome: by a hold (a safe stop), a fault or a restart of the robot.
+        A part is a group of motors, such as an arm; its attractor is the posture to which the controller moves it; it has settled when it
+        has come to rest. Raises ActionInterrupted if the action ends without an outcome: by a hold (a safe stop), a fault or a restart of
+        the robot.
         """
         ...
 
 
 @runtime_checkable
 class Described(Protocol):
-    """A plant that has settings. An agent records them in its store, with its transitions.
+    """A plant that has settings. An agent records them in its store, the file with its transitions.
 
     Later, an agent can continue in that store only if its plant has the same settings.
     """
@@ -104,8 +106,8 @@ class PerceivingPlant:
         """Set the part's attractor, wait until the part has settled or a time limit is over, and return the outcome.
 
         The outcome includes the positions of the objects that are perceived at the end of the action. `target`: (n_part,) rad, the
-        attractor of the part's motors. Raises ActionInterrupted if the action ends without an outcome: by a hold (a safe stop), a fault or
-        a restart of the robot.
+        attractor, that is, the posture to which the controller moves the part. Raises ActionInterrupted if the action ends without an
+        outcome: by a hold (a safe stop), a fault or a restart of the robot.
         """
         return replace(self.plant.act(part, target), perceived=self.perceive())
 
@@ -115,5 +117,5 @@ class PerceivingPlant:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The settings of the inner plant (`mobee.plant.Described.settings`); empty if that plant has none."""
+        """The settings of the plant that performs the actions (`mobee.plant.Described.settings`); empty if it has none."""
         return self.plant.settings if isinstance(self.plant, Described) else {}

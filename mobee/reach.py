@@ -22,7 +22,7 @@ MAX_DISTANCE = 1e3  # m, of a target; larger squares could overflow
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReachTarget:
-    """A sphere as a target for a marker; it repels all links except the reaching hand.
+    """A sphere as a target for a marker (a named point with a normal on a link); it repels all links except the hand that reaches for it.
 
     `position`: (3,) m, root frame, centre of the sphere, at most 1 km away.  `radius`: m, above 0.  `aim`: the marker has to reach the
     "centre" (thesis 8.2) or the "surface" of the sphere.  `normal`: (3,), root frame, desired direction of the marker's normal, scaled to
@@ -68,11 +68,13 @@ class ReachTarget:
 class ReachOutcome:
     """The outcome of a reach in two phases: a force pulls the marker to the target, then the attractor pulls the part back.
 
+    The attractor is the pose to which the control law pulls the motors of the part.
+
     `q`: (n_part,) rad, encoder values at the end of the first phase.  `marker`: (3,) m, root frame, position of the marker that the model
     computes from `q`.  `missing`: m, remaining distance to the target (`ReachTarget.missing`).  `settled`: False if the first phase timed
     out.  `duration`: s of both phases, by the plant's clock.  `touched`: names of the free world objects that at the end of the first phase
-    touch a link that the part moves, that is, overlap one of its solids or fields (volumes that cause repulsive forces).  `after`: outcome
-    of the second phase.
+    touch a link that the part moves, that is, overlap one of its solids (volumes of its body) or fields (larger volumes that cause
+    repulsive forces).  `after`: outcome of the second phase.
     """
 
     marker: Array
@@ -94,9 +96,10 @@ class ReachPlant(Plant, Protocol):
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
         """Pull the named marker by a force to the presented target until the part has settled or a time limit is over (thesis 8.2).
 
-        Meanwhile the attractor stays at the target of the part's last action; when the force has ended, it pulls the part back.  `stay`:
-        True: the attractor moves to the pose in which the force ended, so that the part stays there. There is no second phase then, and the
-        field `after` of the result is the outcome of the pull.
+        The attractor (the pose to which the control law pulls the motors) stays at the target of the part's last action. When the force has
+        ended, the attractor pulls the part back; this is the second phase.  `stay`: True: the attractor moves to the pose in which the
+        force ended, so that the part stays there. Then there is no second phase, and the field `after` of the result is the outcome of the
+        first phase.
         Raises InvalidValue if no target is presented or the part does not move the marker; ActionInterrupted on a hold (a safe stop), a
         fault or a restart of the robot.
         """

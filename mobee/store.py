@@ -169,7 +169,7 @@ class TransitionStore(AgentFile):
         self._last = self._newest()
 
     def append(self, transition: Transition) -> None:
-        """Commit one transition; it is on disk when this method returns.
+        """Commit one transition; it is on disk when this method returns, unless `durable` is False.
 
         Raises MobeeError unless its number `n` is the number of the last stored transition plus 1 (1 for the first transition).
         """
@@ -195,10 +195,10 @@ class TransitionStore(AgentFile):
     def continue_from(self, source: str | Path, settings: dict[str, Any]) -> None:
         """Copy this agent's transitions from the file `source`; do nothing if this file already has settings or transitions of the agent.
 
-        The settings of the agent in `source` must equal `settings`; only those of the plant may differ, so that an agent can learn offline
-        first and then live. `settings` are recorded in this file. The number of copied transitions and the settings of the plant on which
-        they were made are recorded too, in the setting "continued". Raises MobeeError if `source` has no transitions of the agent, or if
-        its settings differ.
+        The settings of the agent in `source` must equal `settings`; only those of the plant may differ, so that an agent can learn first
+        offline (on a plant simulated in one process) and then on the live system. `settings` are recorded in this file. The number of
+        copied transitions and the settings of the plant on which they were made are recorded too, in the setting "continued". Raises
+        MobeeError if `source` has no transitions of the agent, or if its settings differ.
         """
         if self._last or self.settings():
             return
@@ -220,7 +220,7 @@ class TransitionStore(AgentFile):
     def change_explorer(self, n: int, explorer: str) -> None:
         """Record the name of the explorer (exploration strategy) that chooses the actions after the first `n` transitions.
 
-        The record is on disk when this method returns.
+        The record is on disk when this method returns, unless `durable` is False.
         """
         with explained(self.path), transaction(self._db):
             self._write_explorers({n: explorer})

@@ -59,8 +59,8 @@ def choose(forced: str, flags: Iterable[str], folder: Path = FOLDER) -> str:
     """Return the name of the build of the core to load; a build is the library compiled for one level of processors, such as "x86-64-v3".
 
     `forced`: name of the requested build; "": the build of the highest level in `folder` that runs on a processor with these `flags`, the
-    names of features in /proc/cpuinfo. Raises CoreUnavailable if the requested build is unknown or does not run here, or if no build runs
-    here.
+    names of features in /proc/cpuinfo; if `folder` has none, the name of the highest level that runs here. Raises CoreUnavailable if the
+    requested build is unknown or does not run here, or if no level runs here.
     """
     flags = frozenset(flags)
     known, possible = machine_levels(), possible_levels(flags)

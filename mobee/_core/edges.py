@@ -30,10 +30,10 @@ _sweep = function("sweep", ADDRESS, result=INTEGER)
 def sweep(near: Sequence[int], q: Array, edges: Ints, between: Ints) -> tuple[NDArray[np.bool_], int]:
     """Check straight motions between poses for contacts; return which motions are free (E,), and the number of poses checked.
 
-    `near`: addresses of neighbour lists (`mobee._core.engine.Following.at`), one for each thread, all for the same robot and world; the
-    caller keeps the lists alive. `q`: (V, n) rad, the poses. `edges`: (E, 2), the indices in `q` of the two ends of each motion. `between`
-    (E,): number of poses to check between the ends; the ends themselves are not checked. Contacts of fields (volumes that cause repulsive
-    forces) count too, if the robot has fields.
+    `near`: addresses of neighbour lists (lists of pairs of volumes that are near each other, `mobee._core.engine.Following.at`), one for
+    each thread, all for the same robot and world; the caller keeps the lists alive. `q`: (V, n) rad, the poses. `edges`: (E, 2), the
+    indices in `q` of the two ends of each motion. `between` (E,): number of poses to check between the ends; the ends themselves are not
+    checked. Contacts of fields (volumes that cause repulsive forces) count too, if the robot has fields.
     """
     free = np.empty(len(edges), dtype=np.bool_)
     users = (ADDRESS * len(near))(*near)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Robots, scenes and evaluations; declares core/robot.cpp, scene.cpp, kinematics.cpp, evaluate.cpp and neighbours.cpp.
+"""Robots, scenes and evaluations: the functions of core/robot.cpp, scene.cpp, kinematics.cpp, evaluate.cpp and neighbours.cpp.
 
 A `Handle` owns an object of the core: it frees the object, and keeps alive the objects to which that object refers.
 """
@@ -178,8 +178,9 @@ def jacobians(of: Handle, q: Array, link: int, point: Array) -> Array:
 class Room:
     """Buffers in which the core evaluates poses, for one thread at a time; they are reused, because allocation takes longer than one pose.
 
-    `motors`: the number n of motors. `rows`: buffer into which `evaluate_one` writes at most `most` contacts. `torque`: buffer for the
-    projection of the contacts to the motors, (n,) m^2/rad. `asked`: the first argument of the compiled function `evaluate_one`.
+    `motors`: the number n of motors. `rows`: buffer into which `evaluate_one` writes contacts. `most`: number of contacts for which `rows`
+    has space. `torque`: buffer for the projection of the contacts to the motors, (n,) m^2/rad. `asked`: the first argument of the compiled
+    function `evaluate_one`.
     """
 
     __slots__ = ("_at", "_handle", "_request", "asked", "most", "rows", "torque")
@@ -214,7 +215,7 @@ class Room:
 
         `scene`: handle of the scene; the caller keeps it alive. `hands`: up to two hands as four link indices, two for each hand, as
         `mobee.model.snapshot.hand_numbers` returns them; their contacts with targets are ignored. `cut`: True: a contact acts only on the
-        motors of the part that touches.
+        motors of the touching link's own part; False: also on the motors nearer to the base.
         """
         self._request.scene, self._request.hands[:], self._request.cut = scene.at, hands, cut
 
@@ -227,9 +228,10 @@ class Room:
 class Following:
     """A neighbour list of a robot in a scene: the pairs of volumes that are near each other in consecutive poses; for one thread at a time.
 
-    `skin`: a distance [m]; pairs nearer than this are in the list. The list is made again when two volumes may have approached each other
-    by this distance. `cut`: True: a contact acts only on the motors of the part that touches. `at`: address of the list in the core, which
-    a plant of the core uses; it is valid after `enter`, while this object exists.
+    `skin`: a distance [m]; pairs nearer than this are in the list. The list is no longer valid when two volumes may have approached each
+    other by this distance. `cut`: True: a contact acts only on the motors of the touching link's own part; False: also on the motors nearer
+    to the base. `at`: memory address of the list in the core, for a simulated robot that runs in the core (`Plant` of core/plant.cpp); it
+    may be used after the first `enter`, while this object exists.
     """
 
     def __init__(self, skin: float, cut: bool) -> None:
@@ -238,7 +240,7 @@ class Following:
         self._scene: Handle | None = None
 
     def enter(self, scene: Handle, hands: Sequence[int]) -> None:
-        """Set the scene and the reaching hands for the next poses.
+        """Set the scene and the reaching hands for the poses that are evaluated next.
 
         `scene`: handle of the scene, which is kept alive. `hands`: up to two hands as four link indices, two for each hand, as
         `mobee.model.snapshot.hand_numbers` returns them; their contacts with targets are ignored.
@@ -262,7 +264,7 @@ class Following:
         """Return three numbers, for tests: the state of the list, the number of pairs in it, and the number of poses for which it was used.
 
         States: 0: nothing is stored; 1: only the last pose is stored; 2: the list is stored; 3: the world or the reaching hands changed
-        while a list was in use, and the next pose makes a new list.
+        after a list had been used for at least 4 poses, and a new list is made in the next pose.
         """
         found = np.empty(3, dtype=np.int64)
         _neighbours_state(self.at, address(found))
@@ -280,9 +282,9 @@ def sines_cosines(angles: Array) -> tuple[Array, Array]:
 def swung(of: Handle, then: Array, now: Array, shapes: int) -> Array:
     """Return upper bounds (S, L) m of the motion of each shape between two poses, for tests.
 
-    Rows are shapes, in the order of the robot's tables. Column k bounds the motion of a shape relative to the last link that carries
-    both the shape and link k (their last common ancestor). `of`: handle of the robot. `then`, `now`: (J,) rad or m, positions of all joints
-    in the two poses. `shapes`: the number S of shapes.
+    Rows are shapes, in the order of the robot's tables. Column k bounds the motion of each shape relative to the last common ancestor of
+    its link and link k in the kinematic tree. `of`: handle of the robot. `then`, `now`: (J,) rad or m, positions of all joints in the two
+    poses. `shapes`: the number S of shapes.
     """
     out = np.empty((shapes, len(then) + 1))
     _swung(of.at, address(then), address(now), address(out))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The control law and reaching: declares core/law.cpp and core/reach.cpp; their headers document the numbers."""
+"""Declares the structures and functions of the compiled control law and reaches; core/law.hpp and core/reach.hpp explain the fields."""
 
 from __future__ import annotations
 
@@ -29,7 +29,10 @@ MODALITIES = ("position", "velocity", "torque")
 
 
 class Settle(ctypes.Structure):
-    """The thresholds and times of the settle test in the form of the core; `mobee.control.gains.Settle` explains the fields."""
+    """The thresholds and times of the settle test as a C structure of the compiled core; `mobee.control.gains.Settle` explains the fields.
+
+    The settle test ends an action when all its motors are slow, or at a timeout.
+    """
 
     _fields_ = tuple((name, REAL) for name in SETTLE)
 
@@ -44,9 +47,9 @@ class SettleTest(ctypes.Structure):
 
 
 class Law(ctypes.Structure):
-    """The control law with its gains, as the core has it (core/law.hpp).
+    """The control law of one robot with its gains, as a C structure of the compiled core; core/law.hpp explains the fields.
 
-    It has the addresses of tables; the caller keeps these tables alive.
+    The first seven fields contain the addresses of tables (motors, parts, clauses, ...); the caller must keep these tables alive.
     """
 
     _fields_ = (
@@ -77,9 +80,9 @@ _VECTOR, _TWIST = 3 * REAL, 6 * REAL
 
 
 class Reach(ctypes.Structure):
-    """A reach in progress, as the core has it (core/reach.hpp): a force pulls a marker to a target.
+    """A reach in progress, as a C structure of the compiled core; core/reach.hpp explains the fields.
 
-    The caller keeps the tables alive to which the structure points.
+    In a reach a force pulls a marker (a point on a link) to a target. The caller must keep the tables alive to which the structure points.
     """
 
     _fields_ = (
@@ -94,7 +97,10 @@ class Reach(ctypes.Structure):
 
 
 class Calls:
-    """The compiled functions of the control law and of reaches, as attributes; core/law.cpp and core/reach.cpp document their arguments."""
+    """The compiled functions of the control law and of reaches, as attributes; core/law.cpp and core/reach.cpp document their arguments.
+
+    In a reach a force pulls a marker (a point on a link) to a target.
+    """
 
     def __init__(self) -> None:
         self.forces = function("law_forces", ADDRESS, ADDRESS, ADDRESS, ADDRESS, ADDRESS)
@@ -111,16 +117,19 @@ calls = cache(Calls)
 
 @cache
 def term_names() -> tuple[str, ...]:
-    """Return the names of the forces of the control law, in the order in which the core computes and adds them."""
+    """Return the names of the forces that constrain the robot, in the order in which the compiled core (core/law.cpp) adds them.
+
+    They are "limits", "constraints" and "collision". Spring, damping and the forces of clients and reaches are not among them.
+    """
     name = function("law_term", INTEGER, result=ctypes.c_char_p)
     return tuple(term.decode() for term in takewhile(bool, map(name, count())))
 
 
 @cache
 def state_term_names() -> tuple[str, ...]:
-    """Return the names of the forces that depend on the state of the control law, such as its velocity.
+    """Return the names of those forces of `term_names` that depend on the state of the control law, such as its velocity.
 
-    All other forces depend only on q and the contacts.
+    The other forces of `term_names` depend only on q and the contacts.
     """
     needs_state = function("law_needs_state", INTEGER, result=INTEGER)
     return tuple(name for index, name in enumerate(term_names()) if needs_state(index))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Inverse kinematics by least squares from many starts; declares core/least_squares.cpp."""
+"""Inverse kinematics by least squares from many starts, computed by core/least_squares.cpp."""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The builds of the core, one for each x86-64 level and a generic one on other machines, and the choice of one for this processor.
+"""The builds of the core (the compiled C++ code of the library), and which of them this processor runs.
 
-This module imports only Python's own modules, because core/build.py loads it before the library's dependencies are installed.
+There is one build for each level of x86-64 (a set of processor features, such as "x86-64-v3"), and a generic one on other machines. This
+module imports only Python's own modules, because core/build.py loads it before the library's dependencies are installed.
 """
 
 from __future__ import annotations
@@ -78,12 +79,15 @@ def library_file(level: str, folder: Path = FOLDER) -> Path:
 
 
 def source_files() -> list[Path]:
-    """Return the paths of all files from which a build of the core is made, sorted by name."""
+    """Return the paths of all files from which a build of the core (the compiled C++ code) is made, sorted by name."""
     return sorted([*SOURCES.rglob("*.hpp"), *SOURCES.rglob("*.cpp"), SOURCES / "build.py"])
 
 
 def fingerprint() -> str:
-    """Return a hash (16 hexadecimal digits) of the core's sources and build script; each library contains the hash of its own sources."""
+    """Return a hash (16 hexadecimal digits) of the C++ sources and build script of the core.
+
+    Each compiled library contains the hash of the sources from which it was built.
+    """
     digest = hashlib.sha256()
     for source in source_files():
         digest.update(source.relative_to(SOURCES).as_posix().encode() + b"\0" + source.read_bytes() + b"\0")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Overlaps and distances of many pairs of volumes, for tests and benchmarks of the core's narrow phase."""
+"""Overlaps and distances of many pairs of volumes, for tests and benchmarks of the narrow phase of the compiled core (C++ library)."""
 
 from __future__ import annotations
 
@@ -44,7 +44,10 @@ _cut = function("cut", ADDRESS, INTEGER, ADDRESS, ADDRESS, INTEGER, result=INTEG
 
 
 class Volumes:
-    """An array of volumes placed in the root frame, which the core reads in place; it keeps the corners of hulls alive."""
+    """An array of volumes placed in the root frame, which the compiled core reads without a copy.
+
+    The object also holds the corners of hulls, to which the array has pointers.
+    """
 
     def __init__(self, count: int) -> None:
         self.table = np.zeros(count, dtype=VOLUME)

@@ -36,7 +36,7 @@ ALL_TICKS_DONE, ACTION_ENDED, STATE_LOST = range(3)
 
 
 class Motors(ctypes.Structure):
-    """The motors of a simulated robot, as the core has them (core/motors.cpp).
+    """The motors of a simulated robot, with the memory layout of the compiled core (`Motors` of core/motors.hpp).
 
     The structure has the addresses of tables; the caller keeps these tables alive.
     """
@@ -62,7 +62,10 @@ class Braking(ctypes.Structure):
 
 
 class Plant(ctypes.Structure):
-    """A plant (simulated robot under the control law), as core/plant.cpp has it; the caller keeps everything alive to which it points."""
+    """A plant (simulated robot under the control law), with the memory layout of the compiled core (`Plant` of core/plant.cpp).
+
+    The structure has the addresses of other structures and of arrays; the caller keeps all of them alive.
+    """
 
     _fields_ = (
         *((name, ADDRESS) for name in ("neighbours", "law", "law_state", "attractor", "client", "forces")),

@@ -26,10 +26,10 @@ _regions = function("regions", ADDRESS, result=INTEGER)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Region:
-    """A region of a colour in a picture, without holes.
+    """A region of a colour in a picture; its holes are filled.
 
     `outline`: (m, 2) px, column and row of its points, in the order of their angle about the middle of the region. `area`: number of
-    pixels. `hull`: area of the convex hull of the outline, in pixels.
+    pixels, those of the holes included. `hull`: area of the convex hull of the outline, in pixels.
     """
 
     outline: NDArray[np.float64]
@@ -38,14 +38,14 @@ class Region:
 
 
 def regions(likeness: NDArray[np.float32], least: float, around: int) -> list[Region]:
-    """Return the regions of a colour in a picture: sets of pixels of this colour, each pixel connected with others by its sides.
+    """Return the regions of a colour in a picture: 4-connected sets of pixels in which the colour has at least half of the area.
 
-    Regions that touch each other only at corners of pixels are consecutive in the result.
+    The regions inside one 8-connected set of pixels with a likeness above 0 are consecutive in the result.
 
     Args:
         likeness: how much of the colour is in each pixel (H, W), proportional to the share of the pixel that has the colour; 0: none.
         least: smallest area of a region, in pixels.
-        around: side, in pixels (odd), of a square around each pixel. The share of this pixel that has the colour is estimated: its
+        around: side, in pixels (odd), of a square around each pixel. The share of the pixel's area that has the colour is estimated: its
             likeness, divided by the largest likeness in the square or by 1, whichever is larger.
     """
     likeness = np.ascontiguousarray(likeness, dtype=np.float32)

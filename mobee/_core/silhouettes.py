@@ -87,17 +87,19 @@ class Silhouette:
     def rows(self, position: Array, turn: Array, touching: tuple[Array, Array], errors: Array) -> tuple[Array, Array]:
         """Return the distances of the outline's m points from the computed silhouette, (m,) px, and their derivatives (m, p).
 
-        A distance is positive outside. The p columns are the derivatives by the position (3), by the logarithms of the shape's lengths, by
-        the angle about the vertical (if it is unknown), and by the errors. The next call overwrites both arrays.
+        A distance is positive outside the silhouette, and includes the effect of the errors. The p columns are the derivatives by the
+        position (3), by the logarithms of the shape's lengths, by the angle about the vertical (if it is unknown), and by the errors, in
+        this order. The next call overwrites both arrays.
 
         Args:
             position: position of the shape's middle, (3,) m, root frame.
             turn: rotation of the shape's axes, (3, 3), root frame.
-            touching: for each of the K `normals` of this object, the point of the shape whose image is farthest along the normal. First
-                these points (K, 3) m, relative to the shape's middle, in the camera's axes; then the coordinates (K,) of their images along
-                the normals.
-            errors: (e,) estimated errors, in standard deviations: noise and bias of the cameras, three shifts of the outline in each
-                picture (along column and row, and outwards), and two of the outlines in all pictures.
+            touching: for each of the K `normals` that were given when this object was made, the point of the shape whose image is farthest
+                along the normal. First these points (K, 3) m, relative to the shape's middle, in the camera's axes; then the coordinates
+                (K,) of their images along the normals, in the plane at distance 1 of the camera.
+            errors: (e,) estimated errors, each in units of its standard deviation: noise of the cameras, bias of the cameras, three shifts
+                of the outline for each camera (along column, along row, outwards), and two shifts that are the same in all pictures (along
+                column, along row).
         """
         given, (offsets, farthest) = self._given, (np.ascontiguousarray(array, dtype=np.float64) for array in touching)
         errors = np.ascontiguousarray(errors, dtype=np.float64)

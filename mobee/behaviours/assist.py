@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Torso assist: moves the base of an arm so that the target is at a place that the arm reaches well (thesis 9.4.2).
 
-The worth of a place says how well the arm reaches it with its base link at home: it is the reward that a reach learner predicts, trained
-with the torso at home, or the manipulability of the arm. For another posture of the base, the position of the target relative to the base
-is computed; its worth is that of the place with the same position relative to the base at home.
+The worth of a place is a number: how well the arm reaches the place with its base link at home. It is the reward that a reach learner
+predicts, trained with the torso at home, or the manipulability of the arm. For another posture of the base, the position of the target
+relative to the base is computed; its worth is that of the place with the same position relative to the base at home.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ SAMPLES, SPREAD = 4000, 0.05  # postures of the arm; m, over which the manipulab
 class Assistance:
     """The result of `Assist.posture`.
 
-    `q`: (n_part,) rad, the posture to which the part should move. `worth`: how well the arm reaches the target from there. `worth_now`: how
-    well it reaches the target from the present posture. Both are at most 1, and below 0 out of reach.
+    `q`: (n_part,) rad, the posture to which the part that carries the arm should move. `worth`: a number for how well the arm reaches the
+    target from this posture. `worth_now`: the same for the present posture. Both are at most 1; a number below 0 means out of reach.
     """
 
     q: Array
@@ -78,9 +78,9 @@ class Assist:
     def posture(self, q: Array, target: Array) -> Assistance:
         """Return the best posture of the part for a target (3,) m, root frame; all other motors stay as in the posture q (n,) rad.
 
-        The score of a posture is the worth of the target for the arm (at most 1), minus 0.1 per rad^2 of motion. The result is the posture
-        with the highest score among those without contacts of solids whose score is more than 0.05 above that of the present posture; if
-        there is none, the present posture.
+        The score of a posture is the worth of the target (how well the arm reaches it from this posture, at most 1), minus 0.1 per rad^2 of
+        motion. The result is the posture with the highest score among those without contacts of solids whose score is more than 0.05 above
+        that of the present posture; if there is none, the present posture.
         """
         span = self.part.slice
         postures = np.concatenate([q[None, span], self._postures])
@@ -110,7 +110,7 @@ def base_link(robot: Robot, arm: str) -> int:
 
 
 def learned_worth(predictor: RewardPredictor) -> Worth:
-    """Return a function of places (k, 3) m: the largest reward that a reach learner predicts for a target at each place, (k,).
+    """Return a function of places (k, 3) m, root frame: the largest reward that a reach learner predicts for a target at each, (k,).
 
     `predictor`: the learner's predictor of rewards; the largest reward is taken over all states of the learner.
     """
@@ -118,11 +118,11 @@ def learned_worth(predictor: RewardPredictor) -> Worth:
 
 
 def manipulability_worth(robot: Robot, arm: str, marker: str, seed: int = 0) -> Worth:
-    """Return a function of places (k, 3) m: the arm's manipulability sqrt(det J J^T) near each place, as a share of its maximum, (k,).
+    """Return a function of places (k, 3) m, root frame: the arm's manipulability sqrt(det J J^T) near each place, (k,).
 
-    Unlike `learned_worth` it needs no learner. The manipulability is computed in random postures; postures in which the robot touches
-    itself are ignored. For a place that is not near the marker (5 cm) in any posture, the value is minus its distance [m] from the nearest
-    position of the marker.
+    It is given as a share of its maximum. Unlike `learned_worth` it needs no learner. The manipulability is computed in random postures;
+    postures in which the robot touches itself are ignored. For a place that is not near the marker (5 cm) in any posture, the value is
+    minus its distance [m] from the nearest position of the marker.
 
     Args:
         robot: the robot, whose other parts are at home.

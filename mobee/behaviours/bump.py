@@ -18,7 +18,7 @@ START = 1.2  # s after the start of a motion, in which the limb is accelerated a
 
 
 class BumpWatch:
-    """Detects bumps of a limb by the torques of motors near the body.
+    """Detects that a limb has bumped into something, by the torques of the limb's motors near the trunk, such as those of the shoulder.
 
     The motion of the fingers and the play of the wrist disturb these motors least. The part of the torque that gravity does not explain
     changes slowly in a free motion, and suddenly in a bump.
@@ -41,8 +41,8 @@ class BumpWatch:
     def note(self, q: Array, torques: Array, dt: float) -> bool:
         """Take the next measurement and return whether the limb has bumped into something.
 
-        `q`: (n,) rad, positions. `torques`: (n,) N m. `dt`: time since the last call [s]. In the first 1.2 s of a motion no bump is
-        detected.
+        It has if the torques that gravity does not explain have changed by more than the threshold in four measurements in a row. `q`: (n,)
+        rad, positions. `torques`: (n,) N m. `dt`: time since the last call [s]. In the first 1.2 s of a motion no bump is detected.
         """
         unexplained = (torques - gravity_torque(self._robot, q))[self._columns]
         self._time += dt

@@ -34,8 +34,8 @@ class Grip:
         along: distance from the palm's marker to the thing's axis, along the fingers [m].
         gap: distance between palm and thing when the hand closes [m].
         before: distance between palm and thing at the pre-grasp, the pose before the hand moves to the thing [m].
-        height: height of the palm above the ground on which the thing stands [m]. At this height the ground does not touch the fields,
-            volumes that cause repulsive forces, of hand and forearm.
+        height: height of the palm above the ground on which the thing stands [m]. At this height the ground does not touch the fields
+            (volumes that cause repulsive forces) of hand and forearm.
         oppose: rad, opposition of the thumb.
         spread: rad, spread of the fingers.
         fingers: share by which the fingers close, 0 open to 1 closed.
@@ -130,8 +130,8 @@ class SideGrasp:
     def posture(self, palm: Palm, starts: Array | None = None) -> Array | None:
         """Return a posture (n,) rad without contacts of solids in which the palm has this pose; None if none is found.
 
-        It is the one with the smallest `push` among the results of inverse kinematics. `starts`: (S, n) rad, postures from which inverse
-        kinematics starts; None: the `starts` of this object.
+        Among the results of inverse kinematics it is the one with the smallest repulsive forces of the control law (`push`). `starts`:
+        (S, n) rad, postures from which inverse kinematics starts; None: the `starts` of this object.
         """
         found: list[tuple[float, Array]] = []
         for start in self.starts if starts is None else starts:
@@ -158,16 +158,17 @@ class SideGrasp:
     def forces(self, q: Array) -> Array:
         """Return the control law's forces at q (n,) rad, without spring and damping, (n,) rad/s^2.
 
-        They are 0 for motors that the grasp does not move. Targets do not repel the hand of the palm's marker.
+        They are 0 for motors that the grasp does not move. Targets do not repel the hand on which the palm's marker is.
         """
         found = np.zeros(len(q))
         found[self._moved] = self._controller.forces(self._pushing.evaluate(q, reaching=self.marker)).total[self._moved]
         return found
 
     def attractor(self, q: Array) -> Array:
-        """Return the attractor (n,) rad with which the robot rests at q (n,) rad.
+        """Return the attractor (n,) rad (the goal of the control law's spring) with which the robot rests at q (n,) rad.
 
-        At q, the control law's spring force towards this attractor cancels the forces that `forces` returns.
+        At q, the spring force towards this attractor cancels the forces that `forces` returns. A force above 0.8 of the largest spring
+        force is cancelled only in part, and the attractor stays within the motors' limits.
         """
         return attractor_for(self.model.robot, self.gains, q, -self.forces(q))
 

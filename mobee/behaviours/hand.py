@@ -61,7 +61,7 @@ class Hand:
         """Return a copy of q (n,) rad with the fingers closed until they touch objects of the model's world, and these objects' names.
 
         The computation begins with open fingers and closes all of them together; a motor stops as soon as a solid that it moves touches an
-        object.
+        object, or at the end of its range.
         """
         found, moving, touched = self.posture(q, 0.0), np.ones(len(self.motors), dtype=bool), dict[str, None]()
         moves = (self.robot.coupling[0][:, self.motors] != 0.0).T

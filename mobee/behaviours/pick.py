@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Picks up an upright thing and puts it down elsewhere, starting at a pre-grasp beside the thing (thesis 4.3.3, and further steps).
 
-Each step is a motion of a `Body`, which is an offline plant or the robot of the live system.
+Each step is a motion of a `Body`: a robot that is simulated in this process (an offline plant), or the robot of the live system.
 """
 
 from __future__ import annotations
@@ -83,17 +83,20 @@ class Body(Protocol):
 
         `speed`: share of the largest speed, above 0 and at most 1. `watch`: detects bumps; at a bump the robot moves back a little and the
         motion ends; None: bumps are not detected. `forces`: function that takes a posture (n,) rad and returns the forces (n,) rad/s^2 of
-        the control law except spring and damping. The attractor is shifted such that its spring cancels these forces; None: they are not
-        cancelled.
+        the control law except spring and damping. The attractor (the goal of the spring) is shifted such that the spring cancels these
+        forces; None: they are not cancelled.
         """
         ...
 
     def press(self, q: Array, seconds: float) -> None:
-        """Set the attractor to q (n,) rad at once, and leave it there for `seconds`."""
+        """Set the attractor (the goal of the control law's spring) to q (n,) rad at once, and leave it there for `seconds`."""
         ...
 
     def rest_at(self, q: Array) -> None:
-        """Set the attractor to q (n,) rad, and wait until the commanded motion has ended, but at most 1.5 s."""
+        """Set the attractor to q (n,) rad, and wait until the commanded motion has ended, but at most 1.5 s.
+
+        The attractor is the goal of the control law's spring.
+        """
         ...
 
 
@@ -188,7 +191,7 @@ class Picker:
     Args:
         body: the robot.
         grasp: finds postures; the world of its model contains the objects that must not be touched, but not the thing to be picked.
-        watched: names of the motors whose torques show bumps.
+        watched: names of the motors by whose torques bumps (unexpected collisions) are detected.
     """
 
     def __init__(self, body: Body, grasp: SideGrasp, watched: Sequence[str]) -> None:
@@ -202,7 +205,8 @@ class Picker:
     def settle_at(self, q: Array) -> Array:
         """Move torso and arm to the posture q (n,) rad as exactly as possible; return the attractor (n,) rad that was needed for this.
 
-        After each settled motion, the remaining error of the posture is added to the attractor, at most four times.
+        The attractor is the goal of the control law's spring. Each time the robot has come to rest, the remaining error of the posture is
+        added to the attractor, at most four times.
         """
         aim = self.grasp.attractor(q)
         for number in range(CORRECTIONS + 1):
@@ -215,11 +219,11 @@ class Picker:
         return aim
 
     def move(self, path: Array, speed: float, watch: BumpWatch | None = None) -> bool:
-        """Move along a path (K, n) rad; return whether a bump was detected.
+        """Move along a path (K, n) rad; return whether a bump (an unexpected collision) was detected.
 
-        The attractor is shifted from the path such that its spring cancels the forces that `SideGrasp.forces` returns. `speed`: share of
-        the largest speed. `watch`: detects bumps; at a bump the robot moves back a little and the motion ends; None: bumps are not
-        detected.
+        The attractor (the goal of the control law's spring) is shifted from the path such that the spring cancels the forces that
+        `SideGrasp.forces` returns. `speed`: share of the largest speed. `watch`: detects bumps; at a bump the robot moves back a little and
+        the motion ends; None: bumps are not detected.
         """
         return self.body.follow_path(path, speed, watch, self.grasp.forces).bumped
 

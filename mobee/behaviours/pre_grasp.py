@@ -75,10 +75,10 @@ def pre_grasp_map(grasp: SideGrasp, ground: float) -> Roadmap:
 
 
 def aside(trm: Roadmap, ground: float, grip: Grip) -> Array:
-    """Return a posture (n,) rad of the roadmap `trm` with the hand at the side of the table, where it hides nothing from the cameras.
+    """Return a posture (n,) rad of a pre-grasp map with the hand at the side of the table, where it hides nothing from the cameras.
 
-    `trm`: as `pre_grasp_map` returns it. `ground`: height of the surface on which things stand [m]. `grip`: its `height` is that of the
-    palm above this surface.
+    `trm`: the pre-grasp map, a roadmap as `pre_grasp_map` returns it. `ground`: height of the surface on which things stand [m]. `grip`:
+    gives the height of the palm above this surface.
     """
     posture: Array = trm.q[trm.exit(np.array(ASIDE) + np.array([0.0, 0.0, ground + grip.height, 0.0]))]
     return posture
@@ -137,7 +137,7 @@ class MapPlanner:
 def near_any(palms: Array, blocked: Array) -> NDArray[np.bool_]:
     """Return for each of the palm positions (P, 3) m whether it is near one of the blocked positions (B, 3) m: booleans (P,).
 
-    A palm is near a blocked position if their horizontal distance is at most 5 cm and the palm is less than 6.5 cm higher, or lower.
+    A palm is near a blocked position if their horizontal distance is at most 5 cm, and the palm is lower or less than 6.5 cm higher.
     """
     beside = np.linalg.norm(palms[:, None, :2] - blocked[:, :2], axis=2) <= AROUND
     found: NDArray[np.bool_] = (beside & (palms[:, None, 2] < blocked[:, 2] + OVER)).any(axis=1)
@@ -147,8 +147,9 @@ def near_any(palms: Array, blocked: Array) -> NDArray[np.bool_]:
 def is_around(model: Model, marker: str, path: Array, blocked: Array) -> bool:
     """Return whether the marker stays away from the blocked positions (B, 3) m on a path (K, n) rad.
 
-    `near_any` defines near. The path may begin near a blocked position, but once it is away from all of them it must not come near one
-    again. The result is also True for a path that is near blocked positions from its start to its end.
+    Near is meant as in `near_any`: within 5 cm horizontally, and lower or less than 6.5 cm higher. The path may begin near a blocked
+    position, but once it is away from all of them it must not come near one again. The result is also True for a path that is near blocked
+    positions from its start to its end.
     """
     if not len(blocked):
         return True

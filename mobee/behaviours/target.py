@@ -46,9 +46,10 @@ class TargetTrack:
             self._seen.popleft()
 
     def at(self, t: float) -> tuple[Array, Array] | None:
-        """Return the position (3,) m and velocity (3,) m/s of the target at time t [s], by a line through the last seen places.
+        """Return the position (3,) m and velocity (3,) m/s of the target at time t [s], by a line fitted to the last seen places.
 
-        None if no place is known, or if the last one was seen more than `patience` (0.6 s by default) before t.
+        If these cover less than 0.12 s, the position is the last place, and the velocity is 0. Returns None if no place is known, or if the
+        last one was seen more than `patience` (0.6 s by default) before t.
         """
         if not self._seen or t - self._seen[-1][0] > self.patience:
             return None

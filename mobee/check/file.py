@@ -91,9 +91,11 @@ def check_file(
     """Check a shipped robot or world, or a robot or world file; return its content and all findings, errors first.
 
     `name_or_path`: name of a shipped robot or world, or path of a file. `world`: a world; the objects that the robot touches in it at home
-    are reported too. The other arguments are options for reading a URDF or MJCF file, as in `mobee.robot.load.load_robot`: the width of
-    fields [m], "hull" or "bounding" shapes for meshes, the largest number of corners of a hull, the SRDF file, and the home pose. Raises
-    RobotFileError, UnknownName or InvalidValue if the file cannot be read, or if an option is not valid for the file.
+    are reported too. The other arguments are options for reading a URDF or MJCF file, as in `mobee.robot.load.load_robot`. `field`:
+    distance [m] by which the fields (volumes that cause repulsive forces) extend beyond the solids. `meshes`: "hull" or "bounding", the
+    shapes for meshes. `corners`: largest number of corners of a hull, or "all". `srdf`: the SRDF file. `home`: name of the home pose.
+    Raises RobotFileError, UnknownName or InvalidValue if the file cannot be read, or if an option is not valid for the file; NotInstalled
+    for an MJCF file without the package mujoco.
     """
     _require_known(name_or_path)
     path = world_file(name_or_path)

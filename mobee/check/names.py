@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks the names in a robot: names that differ in upper and lower case only, and names that cannot be in a bus key or a list."""
+"""Checks the names in a robot: names that differ in upper and lower case only, and names that other programs cannot use."""
 
 from __future__ import annotations
 
@@ -39,7 +39,11 @@ def names_differing_in_case(subject: Subject) -> Iterator[Finding]:
 
 
 def unusable_names(subject: Subject) -> Iterator[Finding]:
-    """Yield a finding for each part with a name that cannot be in a key of the bus, and each motor with a blank or comma in its name."""
+    """Yield a finding (a problem of the file) for each name of a part or motor that other programs cannot use.
+
+    The name of a part must be valid in a key (a topic) of the message bus: a-z, 0-9 and _ only. The name of a motor must not have blanks or
+    commas, which separate the names in lists of motors.
+    """
     for part in subject.robot.parts:
         if not KEY.fullmatch(part):
             yield Finding(

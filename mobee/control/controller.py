@@ -36,7 +36,7 @@ class Controller:
     The velocity in the equation is the controller's own state; only the position q comes from the encoders. The modality is the kind of
     command: "velocity" (as in the original program); "position", the integral of the controller's own velocity; "torque", which also
     compensates gravity if the robot's file has masses. Commands stay within the motors' limits of acceleration and of velocity (times
-    `speed_scale`), so the safety gate accepts them.
+    `speed_scale`), so the gate (the last safety check before the motors) accepts them.
 
     The attractor q* may be outside the motors' limits: its spring pulls with at most the force `max_spring` of the gains, and the force
     `limits` pushes back. Plants (`mobee.plant.Plant`) refuse an attractor outside the limits.
@@ -152,7 +152,7 @@ class Controller:
 
     @property
     def pushed(self) -> bool:
-        """Whether a force given to `push` acts on a marker. Each step projects it to the motors again, since this depends on the pose."""
+        """Whether `push` was called since the last `clear`. Each step projects its forces to the motors, since J depends on the pose."""
         return bool(self._pushes)
 
     @property
@@ -218,7 +218,7 @@ class Controller:
         self._pushes[marker] = checked_force(f"push on {marker}", f, 6 if len(np.atleast_1d(f)) == 6 else 3)
 
     def clear(self) -> None:
-        """End the forces of `force` and of all calls of `push`; reaches continue."""
+        """End the forces of `force` and of all calls of `push`. Forces that pull a marker to a target (`reach_toward`) continue."""
         self._client, self.forced = np.zeros(len(self.robot.motors)), False
         self._pushes: dict[str, Array] = {}
 
@@ -249,7 +249,7 @@ class Controller:
     def reset(self, q: Array) -> None:
         """Set the control law to rest at the measured q (n,) rad: own velocity 0, attractor and position reference at q.
 
-        Forces given to `force` and `push`, and reaches, continue.
+        Forces given to `force` and `push`, and those that pull a marker to a target (`reach_toward`), continue.
         """
         q = checked("q", q, len(self.robot.motors))
         self._attractor[:] = q
@@ -300,9 +300,9 @@ class Controller:
         """Advance the control law by dt [s] from the measured q (n,) rad and return the command (thesis eq. 5.7).
 
         `forces`: the constraint forces at q; None: computed from `pose`, the robot at q; without a pose the model evaluates q. Forces that
-        depend on the law's state, and the forces of `terms`, are computed if `forces` does not contain them. Raises InvalidValue for a dt
-        at which the law is unstable (`max_dt` or more), for a q that is not finite, and for forces that are not finite or whose sum is
-        above LARGEST_FORCE (1e9 rad/s^2).
+        depend on the law's state, and those of the user-defined terms, are computed if `forces` does not contain them. Forces of the client
+        and of reaches are added. Raises InvalidValue for a dt at which the law is unstable (`max_dt` or more), for a q that is not finite,
+        and for forces that are not finite or whose sum is above LARGEST_FORCE (1e9 rad/s^2).
         """
         if not 0 < dt < self.max_dt:
             require_stable(self.robot, self.gains, dt)

@@ -83,7 +83,8 @@ class Forces(Mapping[str, Array]):
 def published_terms() -> tuple[str, ...]:
     """Return the names of the control law's forces that depend on the pose only.
 
-    In the live system the model service computes these forces and sends them to the controller service, which computes all others.
+    In the live system the model service (the process that computes contacts) computes these forces and sends them to the controller
+    service (the process that computes motor commands). The controller service computes all other forces.
     """
     return tuple(name for name in term_names() if name not in state_term_names())
 
@@ -91,7 +92,8 @@ def published_terms() -> tuple[str, ...]:
 def needs_contacts() -> bool:
     """Return whether some forces of the control law depend on the law's state, such as its velocity, and not on the pose only.
 
-    If so, the controller service of the live system computes these forces, and the model service also publishes all contacts for this.
+    If so, the controller service of the live system (the process that computes motor commands) computes these forces. It needs all contacts
+    for this, so the model service (the process that computes contacts) publishes them too.
     """
     return bool(state_term_names())
 

@@ -81,7 +81,7 @@ class Gains:
             is squared, and the square is the force in deg/s^2.
         contact_slope, client_slope: slope at 0 of the function that bounds the force (k of eq. 5.8).
         client_squash: "each" bounds a client's force motor by motor (eq. 5.8 as printed), "direction" bounds its norm in each part.
-        settle: thresholds of the settle test.
+        settle: thresholds of the settle test, which decides when an action ends.
         weights: pairs (pattern of motor names, 0 or 1). A motor of weight 0 is never moved. The first pattern that matches a motor counts;
             a motor without a match has weight 1.
         motors: pairs (pattern of motor names, gains of the motors that match it), as `with_motors` adds them.
@@ -134,14 +134,15 @@ class Gains:
     def default(cls) -> Gains:
         """Return the default gains: the equations of the thesis with our own tuning.
 
-        A field is a shape around the solids of a link; two fields that overlap repel each other. With these gains fields
-        can be pressed into each other, but their forces stop the links before the solids touch.
+        A field is a shape around the solids of a link; two fields that overlap repel each other. With these gains fields can be pressed
+        into each other, but their forces stop the links before the solids touch.
 
         The time constant C/K is 0.32 s. The experiment `gain-tuning` chose the numbers, with simulated motors that have lag and delay, and
         commands up to three ticks old at 100 Hz. With a stiffer contact the robot begins to oscillate; with stronger springs of the
         attractor its links pass through the fields. The springs of torso and shoulders are weaker, because many motors push a hand
-        together. The bound of the contact force is a little above the sum of the springs of an arm. So the force can rise steeply with the
-        depth of a contact, but cannot grow without limit.
+        together. The contact force on a part is bounded by its norm, 35 rad/s^2. This is more than the norm of the largest spring forces of
+        the seven motors of an arm without its hand, 28 rad/s^2. So the force can rise steeply with the depth of a contact, but
+        cannot grow without limit.
         """
         return cls(
             law="default",
@@ -163,7 +164,7 @@ class Gains:
 
     @classmethod
     def published_2014(cls) -> Gains:
-        """Return the gains of the 2014 program, converted from degrees. They are needed to reproduce the published findings.
+        """Return the gains of the original program of 2014, converted from degrees. They are needed to reproduce the published findings.
 
         With these gains the fingers and eyes do not move, because their weight is 0. Obstacles come several centimetres deep into the
         fields, the shapes around the links that cause repulsive forces.
@@ -194,8 +195,8 @@ class Gains:
         A field is a shape around a link; its contacts cause repulsive forces. The lever of a contact is the change of its depth if the
         motors move by 1 rad. For such robots the force is divided by the squared lever, so that contacts have the same stiffness for all
         levers well above `Robot.least_lever`: contact_gain * LEVER^2 = 450 1/s^2 (LEVER: 0.5 m). The bound of the default gains is tuned
-        for the wide fields of the iCub. With that bound, on the robots described here, strong springs of the attractor would press
-        the fields of two links into each other.
+        for the wide fields of the iCub. With that bound, strong springs of the attractor would press the fields of two links of these other
+        robots into each other.
         """
         return replace(cls.default(), max_contact=50.0)
 
@@ -276,8 +277,9 @@ class SettleTest:
     def update(self, t: float, speeds: Array, accelerations: Array) -> Verdict:
         """Return "settled" if a check is due at time t [s] and the part is slow, "timeout" if the time is over, else "moving".
 
-        `speeds` (n_part,) rad/s and `accelerations` (n_part,) rad/s^2: commanded motion of the part's motors. For a motor that slides, give
-        its speed in m/s and its acceleration in m/s^2, divided by its `mobee.robot.motor_units.fine_units`.
+        `speeds` (n_part,) rad/s and `accelerations` (n_part,) rad/s^2: commanded motion of the part's motors. For a motor that slides,
+        convert both from m to rad: divide speed and acceleration by the motor's entry of `mobee.robot.motor_units.fine_units`. The part is
+        slow if no value exceeds its threshold in `Settle`.
         """
         motion = np.array([speeds, accelerations], dtype=np.float64)
         verdict: int = self._check(ctypes.byref(self._thresholds), ctypes.byref(self._memory), t, motion.tobytes(), motion.shape[1])

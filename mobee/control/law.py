@@ -73,8 +73,8 @@ class Law:
 
         If more forces were added to the compiled core, there are more rows, in the order of `mobee._core.law.term_names()`.
 
-        `torque` (n,): the sum over all contacts of fields of J^T (depth * normal), m^2/rad, from `Pose.projection` or
-        `Pose.projection_of_part`. `state`: the state of the control law before the step; None: at rest.
+        `torque` (n,): the sum over all contacts of fields (volumes that cause repulsive forces) of J^T (depth * normal), m^2/rad, from
+        `Pose.projection` or `Pose.projection_of_part`. `state`: the state of the control law before the step; None: at rest.
         """
         found = np.empty((len(core.term_names()), len(self)))
         given = numbers(q, len(self)), numbers(torque, len(self)), address(self._still if state is None else state)
@@ -82,7 +82,7 @@ class Law:
         return found
 
     def at_rest(self, q: Array) -> Table:
-        """Return the state of the control law at rest at the measured q (n,) rad, with the columns of `mobee._core.law.STATE`."""
+        """Return the state of the control law at rest at the measured q (n,) rad: (n,) structures of the type `mobee._core.law.STATE`."""
         state: Table = np.zeros(len(self), dtype=core.STATE)
         state["reference"] = np.clip(q, self.motors["low"], self.motors["high"])
         state["reference"][self.active] = q[self.active]
@@ -159,7 +159,7 @@ class ClauseRows:
 
 
 def stack_clauses(clauses: Sequence[Clause], n: int) -> ClauseRows:
-    """Return the rows of all clauses of a robot with n motors as matrices, one below the other."""
+    """Return the rows of all clauses (conditions on motor positions) of a robot with n motors as matrices, one below the other."""
     counts = [len(c.b) for c in clauses]
     a = np.concatenate([c.a for c in clauses]) if clauses else np.zeros((0, n))
     b = np.concatenate([c.b for c in clauses]) if clauses else np.zeros(0)
@@ -179,7 +179,7 @@ FRICTION = 5.0  # N m s/rad
 class Command:
     """One command for all motors: position [rad], velocity [rad/s], torque [N m], each (n,) in the order of `robot.motors`.
 
-    The modality of the controller decides which of the three the motors follow.
+    The motors follow one of the three: that of the controller's modality, "position", "velocity" or "torque".
     """
 
     position: Array

@@ -153,12 +153,13 @@ ReachStatus = Literal["reaching", "reached", "stuck"]
 
 
 class Reacher:
-    """Pulls a marker of a controlled robot to a target; call `update` once per tick, and `stop` at the end.
+    """Pulls a marker (a named point on a link) of a controlled robot to a target.
 
-    The pull begins when the object is made. All motors that move the marker take part, also those of the torso. The controller's forces
-    keep the robot away from obstacles. With the gains of 2014 (`Gains.published_2014`) the springs of the attractor pull back during the
-    reach, so that the marker stops before the target. A controller has at most one reach of the whole body: a new `Reacher` replaces the
-    previous one. To reach with two hands at the same time use `Controller.reach_toward` with their parts.
+    Call `update` once per tick (control cycle), and `stop` at the end. The pull begins when the object is made. All motors that move the
+    marker take part, also those of the torso. The controller's forces keep the robot away from obstacles. With the gains of 2014
+    (`Gains.published_2014`) the control law's springs pull the robot back to the attractor (their goal) during the reach, so that the
+    marker stops before the target. A controller has at most one reach of the whole body: a new `Reacher` replaces the previous one. To
+    reach with two hands at the same time use `Controller.reach_toward` with their parts.
     """
 
     __slots__ = ("_best", "_controller", "_marker", "_seen", "_since", "_tolerance", "angle", "distance", "target")
@@ -199,7 +200,10 @@ class Reacher:
         return "stuck" if self._since > PATIENCE else "reaching"
 
     def stop(self, q: Array) -> None:
-        """End the pull. The attractor of all motors that move the marker is set to q (n,) rad, so that the marker stays."""
+        """End the pull, and set the attractor of all motors that move the marker to q (n,) rad, so that the marker stays.
+
+        The attractor is the goal of the control law's springs.
+        """
         controller = self._controller
         controller.end_reach(None)
         moved = np.abs(controller.model.jacobian(q, self._marker)).max(axis=0) > 0

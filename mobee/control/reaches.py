@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The reaches of a controller that are in progress. The formulas are in core/reach.cpp and core/reach_pull.cpp."""
+"""The reaches of a controller that are in progress: forces that pull markers to targets (thesis 8.2).
+
+The formulas are in core/reach.cpp and core/reach_pull.cpp.
+"""
 
 from __future__ import annotations
 
@@ -55,7 +58,10 @@ class Reaching:
 
 
 class Reaches:
-    """The reaches in progress: at most one for each part, and at most one of the whole body, which has None in place of a part."""
+    """The reaches in progress, forces that pull markers to targets: at most one for each part, and at most one for the whole body.
+
+    In all methods, the part None means the reach of the whole body.
+    """
 
     __slots__ = ("_addresses", "_chains", "_core", "_law", "_robot", "_under_way", "address")
 
@@ -73,8 +79,9 @@ class Reaches:
         return self._under_way[part]
 
     def begin(self, part: str | None, marker: str) -> None:
-        """Begin a reach of a part (None: of the whole body) with a marker. It replaces the part's previous reach and has no target yet.
+        """Begin a reach of a part (None: of the whole body): a force that will pull a marker. It has no target yet (see `Reaching.aim`).
 
+        A reach of the part that is in progress is replaced.
         Raises UnknownName for an unknown part or marker, InvalidValue if the marker is moved by none of the motors that may move.
         """
         if (part, marker) not in self._chains:

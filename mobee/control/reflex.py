@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MoBeE 1.0: the reflex that takes control from the client at a contact and retraces the recent poses (thesis chapter 4)."""
+"""MoBeE 1.0: a reflex that moves the robot back along its recent poses after a contact (thesis chapter 4).
+
+Meanwhile the client, which is the program that commands the robot otherwise, has no control.
+"""
 
 from __future__ import annotations
 
@@ -23,18 +26,19 @@ from mobee.robot.robot import Robot
 class ReflexSettings:
     """Settings of the reflex; times in s.
 
-    A violation is a contact, a motor beyond its limit, or a broken constraint on several joints. A waypoint is a recorded pose that counts
-    as safe: the client has marked it, or an earlier recovery has returned control there.
+    A violation is a contact, a motor beyond its limit, or a broken constraint on several joints. The client is the program that commands
+    the robot while the reflex does not. A waypoint is a recorded pose that counts as safe: the client has marked it, or an earlier recovery
+    has returned control there.
 
     Attributes:
-        history: how long poses are recorded.
+        history: total duration of the recorded poses; when it is reached, each new pose replaces the oldest one.
         confirm: how long a violation must last without a break before it counts.
         release: how long a violation must be absent before it counts as over.
         brake: how long the robot brakes before it retraces its poses.
         dead_time: how long the robot waits after retracing, before the pose is checked.
         pace: number of recorded poses that are retraced in each tick.
         must_be_clear: True: return control to the client only at a pose without violations; if a waypoint has a violation, retrace
-            further. False: return control at the first waypoint.
+            further. False: return control at the first waypoint, or at the oldest recorded pose if there is no waypoint.
     """
 
     history: float = 30.0
@@ -57,7 +61,8 @@ class ReflexSettings:
     def naive(cls) -> ReflexSettings:
         """Return the settings of thesis 4.1: a violation counts immediately, and control returns to the client at the first waypoint.
 
-        The result is in thesis 4.4: oscillation between the two controllers, and recoveries that fail.
+        With these settings, control oscillates between the client (the program that commands the robot) and the reflex, and recoveries fail
+        (thesis 4.4).
         """
         return cls(confirm=0.0, release=0.0, brake=0.0, dead_time=0.0, must_be_clear=False)
 
@@ -73,7 +78,8 @@ class Violation:
 
     `kind`: "contact", "limit" or "clause". `what`: names of the two volumes of a contact ("first - second"), name of the motor, or part and
     index of the clause. `depth`: depth of a contact in m; distance beyond a limit in rad (m for a motor that slides); for a clause, the
-    distance in rad to the nearest position that satisfies it. A clause is satisfied if a.q + b > 0 holds for at least one of its rows.
+    distance in rad to the nearest position that satisfies it. A clause has one or more rows (a, b); the pose q satisfies it if
+    a.q + b > 0 for at least one row.
     """
 
     kind: Literal["contact", "limit", "clause"]
@@ -157,9 +163,10 @@ class Counts:
 
 
 class Debounce:
-    """A filter for a signal that is True or False: its output changes after the input has differed from it for some consecutive ticks.
+    """A filter for a signal that is True or False: its output changes after several consecutive inputs have differed from it.
 
-    The reflex filters its violations by it (thesis 4.4). `on`: the present output.
+    There is one input in each tick; the constructor's arguments are the numbers of inputs needed for a change to True and to False. The
+    reflex uses it to filter whether its pose has a violation (thesis 4.4). `on`: the present output.
     """
 
     def __init__(self, confirm: int, release: int) -> None:
@@ -177,12 +184,13 @@ class Debounce:
 
 
 class Reflex:
-    """A state machine that decides in each tick what commands the robot: the client, or the reflex, which retraces recent poses.
+    """A state machine that decides in each tick whether the client or the reflex commands the robot; the reflex retraces recent poses.
 
-    State "forward": the client commands, and poses are recorded; a confirmed violation changes to "brake". State "brake": the robot stops;
-    after the time `brake` of the settings, the state changes to "rewind". State "rewind": the target moves back along the recorded poses,
-    to a waypoint (a pose that counts as safe, see `mark`) or to the oldest pose; then the state changes to "dead". State "dead": the robot
-    waits for the time `dead_time`. Then, if the pose has no violation, or if the setting `must_be_clear` is False, the state changes to
+    The client is the program that commands the robot while the reflex does not. State "forward": the client commands, and poses are
+    recorded; a violation that has lasted for the time `confirm` of the settings changes the state to "brake". State "brake": the robot
+    stops; after the time `brake`, the state changes to "rewind". State "rewind": the target moves back along the recorded poses, to a
+    waypoint (a pose that counts as safe, see `mark`) or to the oldest pose; then the state changes to "dead". State "dead": the robot waits
+    for the time `dead_time`. Then, if the pose has no violation, or if the setting `must_be_clear` is False, the state changes to
     "forward"; otherwise to "rewind", or to "stuck" if no recorded pose is left. State "stuck" ends when the pose has no violation, or by
     `accept`.
     """
@@ -219,7 +227,7 @@ class Reflex:
     def mark(self) -> bool:
         """Mark the newest recorded pose as a waypoint: a pose that is known to be safe, and at which a recovery may end.
 
-        Return False, and mark nothing, if no pose is recorded or the client does not command.
+        Return False, and mark nothing, if no pose is recorded, or if the state is not "forward".
         """
         if self.state != "forward" or not self._history:
             return False
@@ -227,10 +235,10 @@ class Reflex:
         return True
 
     def accept(self, q: Array, violations: Sequence[Violation]) -> None:
-        """Return control to the client in state "stuck", although the pose has violations; in other states nothing happens.
+        """Change from state "stuck" to "forward" although the pose has violations; in other states nothing happens.
 
-        `q`: (n,) rad, measured pose. `violations`: the violations of this pose; later calls of `tick` ignore them until a pose has had no
-        violation at all.
+        `q`: (n,) rad, measured pose. `violations`: the violations of this pose. Later calls of `tick` ignore them until no violation of any
+        kind has been present for the time `release` of the settings.
         """
         if self.state != "stuck":
             return
@@ -239,7 +247,7 @@ class Reflex:
         self._keep_place(q)
 
     def tick(self, q: Array, violations: Sequence[Violation]) -> Array | None:
-        """Advance by one tick at the measured pose q (n,) rad; return the reflex's target pose (n,) rad, or None if the client commands.
+        """Advance by one tick at the measured pose q (n,) rad; return the reflex's target pose (n,) rad, or None in state "forward".
 
         `violations`: the violations of this pose. While the robot brakes, the target is the pose at which braking began; while it is stuck,
         the last target.

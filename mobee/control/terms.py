@@ -24,7 +24,8 @@ class State:
     """The input of the function of a user-defined force in one tick; arrays are read-only.
 
     `q`: (n,) rad, measured positions. `velocity`: (n,) rad/s, the velocity that the control law has computed; it is not measured. `dt`: s,
-    duration of the tick. `robot`: the robot. `pose`: the robot at q in its world; `evaluate` returns it and is called at most once.
+    duration of the tick. `robot`: the robot. `pose`: the robot at q in its world. `evaluate`: a function that returns this pose; it is
+    called when `pose` is read for the first time.
     """
 
     __slots__ = ("_evaluate", "_pose", "dt", "q", "robot", "velocity")
@@ -47,7 +48,7 @@ class Term:
     """A user-defined force, added on the right-hand side of thesis eq. 5.7.
 
     `name`: of a-z, 0-9 and _, a letter first, different from the names of the control law's forces. `function`: takes a `State` and returns
-    the force on the motors, (n,) rad/s^2, or m/s^2 for a motor that slides. It is called in every tick.
+    the force on the motors, (n,) rad/s^2, or m/s^2 for a motor of a prismatic joint. It is called in every tick (control cycle).
     """
 
     name: str
@@ -60,7 +61,7 @@ class Term:
             raise InvalidValue(f"term {self.name!r}: its function is {self.function!r}; it must be a function of the state.")
 
     def force(self, state: State) -> Array:
-        """Call the function and return the force, (n,) rad/s^2, or m/s^2 for a motor that slides.
+        """Call the function and return the force, (n,) rad/s^2, or m/s^2 for a motor of a prismatic joint.
 
         Raises InvalidValue, with the name of the term, if the function fails or its result is not valid.
         """

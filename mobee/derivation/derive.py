@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Derives from any robot what curious agents need: arms as parts, joints to learn, limits, home, pairs tested for contacts, and fields."""
+"""Derives from any robot what curious agents need: arms, joints to learn, limits, home, links tested for contacts, and fields.
+
+A field is a volume around a solid (a rigid volume of a link) that causes a repulsive force.
+"""
 
 from __future__ import annotations
 
@@ -30,8 +33,8 @@ class Arm:
     """An arm with which a curious agent learns.
 
     `part`: name of its part. `motors`: names of all motors of the arm. `joints`: names of the motors to learn: the states of the agent are
-    the points of a lattice of their positions. `movement`: m, how far the end of the arm moves (mean over random poses) if one motor moves
-    over its whole range, for the motor that moves it farthest; 0 for an arm that the caller of `derive` requested.
+    the points of a lattice of their positions. `movement`: m, how far one motor moves the end of the arm over the motor's range: mean over
+    random poses of the other motors, for the motor with the largest mean; 0 for an arm that the caller of `derive` requested.
     """
 
     part: str
@@ -45,12 +48,12 @@ class Derived:
     """A robot that curious agents can use at once, and the derived values.
 
     `robot`: the robot with all changes. `arms`: the arms that learn. `limited`: names of motors that had a range of a turn or more; the
-    range is now at most half a turn to each side. `home_moved`: names of motors whose home was moved, so that no solids touch at home and
-    fields (volumes that cause repulsive forces) do not overlap. `narrowed`: names of motors whose range is narrower now. In the rest of the
-    old range, pairs of solids touch that fields cannot keep apart. For combinations of several motors, clauses (conditions on motor
-    positions) were added to the robot instead. `left_out`: pairs of names of links that are no longer tested for contacts. `field`: width
-    of the fields that were added [m], 0: none. `gains`: gains of the control law: `Gains.derived()`, or the default ones for a robot that
-    has its own fields.
+    range is now at most half a turn to each side. `home_moved`: names of motors whose home was moved, so that at home no solids (rigid
+    volumes of links) touch and no fields (volumes that cause repulsive forces) overlap. `narrowed`: names of motors whose range is narrower
+    now, because in the rest of the old range some pairs of solids touch and fields cannot prevent it. Where this depends on several motors,
+    clauses (conditions on motor positions) were added to the robot instead. `left_out`: pairs of names of links that are no longer tested
+    for contacts. `field`: width of the fields that were added [m], 0: none. `gains`: gains of the control law: `Gains.derived()`, or the
+    default ones for a robot that has its own fields.
     """
 
     robot: Robot
@@ -92,7 +95,8 @@ def derive(robot: Robot, parts: Mapping[str, Sequence[str]] | None = None, seed:
         seed: seed of the random poses in which contacts and movements are measured.
 
     Raises:
-        InvalidValue: no motor moves the end of a chain, or a part in `parts` is given no motors, or motors of another part.
+        InvalidValue: no motor moves the end of a chain; a part in `parts` is given no motors, or motors of another part; or `parts` names a
+            motor twice.
         UnknownName: `parts` names a motor that the robot does not have.
     """
     robot, limited = bounded(robot)

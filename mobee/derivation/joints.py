@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Chooses the joints of an arm that move its end most, and limits for joints with a range of a turn or more."""
+"""Chooses the joints of an arm that move its end most, and limits motors with a range of more than a turn."""
 
 from __future__ import annotations
 
@@ -23,8 +23,9 @@ TURN = 2.0 * np.pi
 def bounded(robot: Robot) -> tuple[Robot, list[str]]:
     """Limit every motor with a range of more than a turn to one turn; return the robot and the names of the changed motors.
 
-    With a larger range, positions one turn apart are the same pose, so that several states of a lattice would be the same pose. The middle
-    of the new range is 0, or home if home is not within half a turn of 0; or the nearest place from which the turn is within the old range.
+    With a larger range, positions one turn apart are the same pose, so that several states of a lattice would be the same pose. For a motor
+    that drives joints with other scales than 1, the turn is that of the joint that moves most. The middle of the new range is 0, or home if
+    home is more than half a turn from 0. If the new range would exceed the old limits, it is shifted into them.
     """
     changed = [motor.name for motor in robot.motor_table if np.ptp(motor.limits) >= TURN - 1e-6 and not slides(robot, motor)]
     table = []

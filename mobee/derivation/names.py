@@ -17,9 +17,11 @@ LONGEST = 24  # letters of a name, which stands in the keys of the bus
 
 
 def names_of(groups: Sequence[Sequence[str]]) -> list[str]:
-    """Return a name for each group of motors, made of words that the names of its motors have in common: "left_arm", "fl_leg", "arm_2".
+    """Return a name for each group of motors, from the words that the names of its motors have in common: "left_arm", "fl_leg", "arm_2".
 
-    The names are all different and have only a-z, 0-9 and _. `groups`: for each group the names of its motors.
+    The limb that the motors' names indicate (leg, arm or head) is added if the words do not contain it. The name is "arm" if there is no
+    word, and only the limb if there is one group. The names are all different and have only a-z, 0-9 and _. `groups`: for each group the
+    names of its motors.
     """
     names: list[str] = []
     for motors in groups:

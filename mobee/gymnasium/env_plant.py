@@ -67,11 +67,11 @@ class EnvPlant(InstantPlant):
 
     @property
     def q(self) -> Array:
-        """The last observed state as positions of the space's two motors, shape (2,): the number of the state, and 0."""
+        """The last observed state as positions of the motors "state" and "action" of `DiscreteSpace`, (2,): the state's number, and 0."""
         return self.space.target(self._state)
 
     def measure(self, part: str) -> Array:
-        """Return the last observed state as positions of the space's two motors, shape (2,): the number of the state, and 0.
+        """Return the last observed state as positions of the motors "state" and "action" of `DiscreteSpace`, (2,): its number, and 0.
 
         `part`: must be `space.part`, else UnknownName is raised.
         """

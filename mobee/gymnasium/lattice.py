@@ -183,7 +183,8 @@ class LatticeEnv(Env[Any, Any]):
     def step(self, action: int) -> tuple[int, float, bool, bool, dict[str, Any]]:
         """Perform a whole action of the part: the controller moves it until it has settled or timed out.
 
-        Return the state reached, the reward, whether the goal was reached (it ends the episode), False (never truncated here), and info.
+        `action`: its number among the actions of the present state, see the class. Return the state reached, the reward, whether the
+        goal was reached (it ends the episode), False (never truncated here), and info.
         """
         outcome = self._arm.plant.advance()[0][1] if self._arm.begin(int(action)) else None
         state, reward, over, info = self._arm.end(int(action), outcome)

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`MoBeE/Reach-v0`: reach positions with a hand. Actions move the attractor of an arm, and the controller prevents collisions."""
+"""`MoBeE/Reach-v0`: reach positions with a hand. Actions move the attractor of an arm, and the controller prevents collisions.
+
+The attractor is the position to which the spring of the control law pulls the joints.
+"""
 
 from __future__ import annotations
 
@@ -39,10 +42,11 @@ class ReachTask(Settings):
 
     Args:
         robot: name of a shipped robot, path of an XML or URDF file, or a Robot.
-        joints: motor names, all of one part; the part's other motors keep their attractors at home.
+        joints: motor names, all of one part; the attractors of the part's other motors (the positions to which the control law pulls them)
+            stay at home.
         marker: the marker of the robot that must reach the goals.
         world: name of a shipped world, path of an XML file, or a World; None: nothing but the robot.
-        plant: settings of the simulated robot; None: default gains, ticks of 20 ms.
+        plant: settings of the simulated robot; None: default gains, ticks (periods of the controller) of 20 ms.
         period: duration of a step, s, rounded to whole ticks.
         step: largest motion of a joint's attractor in one step (action 1), rad.
         tolerance: distance at which a goal counts as reached, m.
@@ -144,9 +148,10 @@ def extent(robot: Robot, marker: str) -> float:
 class ReachEnv(Env[Any, Any]):
     """A Gymnasium environment: reach positions with a hand, while the controller of MoBeE prevents collisions.
 
-    An action (d,) in [-1, 1] moves the attractor of each of the d joints by up to `step` rad, within the joint's limits; then `period`
-    seconds are simulated. Contacts of fields, joint limits and cable constraints cause forces during every step. A field is a shape around
-    a link; it is not solid, but its contacts cause repulsive forces.
+    An action (d,) in [-1, 1] moves the attractor of each of the d joints (the position to which the control law's spring pulls it) by up to
+    `step` rad, within the joint's limits; then `period` seconds are simulated. Contacts of fields, joint limits and cable constraints cause
+    forces during every step. A solid is a rigid volume of a link. A field is a larger volume around a link; it is not solid, but its
+    contacts cause repulsive forces.
 
     The observation is a dict: `observation` (3 d,): positions of the joints by the encoders [rad], their attractors [rad], and the
     controller's own velocities [rad/s]; `achieved_goal` (3,): position of the marker, a named point on the robot, and
@@ -198,6 +203,7 @@ class ReachEnv(Env[Any, Any]):
     def step(self, action: ArrayLike) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Move the attractors of the joints by an action (d,) in [-1, 1], times `step` rad, and simulate `period` seconds.
 
+        An attractor is the position to which the control law pulls a joint.
         Return observation, reward, False (never terminated), False (never truncated here), and info.
         """
         ((solid, field),) = self._reaching.move(self._robots, _ONLY, np.asarray(action, dtype=np.float64)[None])
@@ -292,10 +298,11 @@ class ReachVectorEnv(RobotVectorEnv):
         return seen, self._infos(self._reaching.judge(seen["achieved_goal"], self._goals)[1])
 
     def step(self, actions: Array) -> tuple[Observation, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
-        """Move the attractors by actions (num_envs, d) and simulate `period` seconds.
+        """Move the attractors by actions (num_envs, d) in [-1, 1], times `step` rad, and simulate `period` seconds.
 
-        A robot whose episode has ended ignores its action and begins a new episode. Return observations, rewards, False (never terminated),
-        whether episodes are truncated, each (num_envs, ...), and infos.
+        An attractor is the position to which the control law pulls a joint. A robot whose episode has ended ignores its action, begins a
+        new episode and gets the reward 0. Return observations, rewards, False (never terminated), whether episodes are truncated, each
+        (num_envs, ...), and infos.
         """
         begun, depths = self._over, np.zeros((self.num_envs, 2))
         going = np.flatnonzero(~begun)

@@ -52,11 +52,11 @@ def model_of(robot: RobotFile, world: WorldFile) -> Model:
 
 @per_robot
 def guarded(robot: Robot) -> Robot:
-    """Return a copy of the robot that tests fewer pairs of its solids for contacts: only those that fields protect from contacts.
+    """Return a copy of the robot that tests two of its solids for contacts only if the fields of their links are tested too.
 
-    A field is a shape around a link; its contacts cause repulsive forces. Two solids are still tested if the fields of their links are
-    tested against each other. If a link has no fields, such as a finger, those of the nearest link towards the base that has some decide.
-    For example, upper arm and pelvis of the iCub are no longer tested: their hulls overlap when the arm is beside the body.
+    A field is a shape around a link; its contacts cause repulsive forces, which keep the solids apart. For a link without fields, such as a
+    finger, the fields of the nearest link towards the base that has fields are used. For example, upper arm and pelvis of the iCub are no
+    longer tested: their hulls overlap when the arm is beside the body.
     """
     with_field = {shape.link for shape in robot.shapes if shape.role == "field"}
     guard = list(range(len(robot.links)))

@@ -39,7 +39,7 @@ class TableTask(Settings):
 
     Args:
         robot: name of a shipped robot, path of an XML or URDF file, or a Robot.
-        parts: a dict from the name of each part, which is an agent, to the joints of its lattice.
+        parts: a dict from the name of each part, an agent, to the joints of its lattice (grid of poses, one for each state).
         levels: fractions of each joint's range; the samples (points of a lattice) are at all combinations of them, see `mobee.Lattice`.
         neighbours: a dict from a part's name to the number of neighbours to which each of its states has actions; for parts that it does
             not name: 16, or all other states if there are fewer.
@@ -62,9 +62,9 @@ class TableTask(Settings):
 class TableEnv(ParallelEnv[str, int, int]):  # type: ignore[misc]  # PettingZoo has no type information
     """A PettingZoo environment: several parts of one robot act at the same time, and each begins its next action when it has settled.
 
-    Each agent is a part. Its observation is its own state, the number of a cell of its lattice. Its action is an index into the neighbours
-    of this state, in ascending order. It does not observe the other parts. A step begins the actions of all agents whose parts are at rest,
-    then simulates until at least one part has settled or timed out.
+    Each agent is a part. Its observation is its own state: the number of the nearest pose of its lattice (grid of poses, `mobee.Lattice`).
+    Its action is an index into the neighbours of this state, in ascending order. It does not observe the other parts. A step begins the
+    actions of all agents whose parts are at rest, then simulates until at least one part has settled or timed out.
 
     `infos[agent]["ready"]`: whether the agent's action has ended. If it is True, the info has the outcome (`q` (n_part,) rad by the
     encoders, `settled`, `duration` in s, `touched`), the agent gets its reward, and its next action is used. If it is False, the part still

@@ -19,7 +19,7 @@ from mobee.store import Transition, TransitionStore
 
 
 class CuriousAgent(CuriousLearner):
-    """Learns the transition model of one part by trying the actions from which it expects to learn most.
+    """Learns the transition model of a part (motors commanded together) by trying the actions from which it expects to learn most.
 
     Its decisions depend only on its settings and its transitions. An agent that is restarted with its store therefore continues as if it
     had never stopped. Each transition is stored before the agent learns from it.

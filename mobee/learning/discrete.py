@@ -20,10 +20,11 @@ MOTORS = ("state", "action")
 class DiscreteSpace(Space):
     """Numbered states, each with the same numbered actions, of a decision problem without a robot.
 
-    It is the Space of a robot with two motors, "state" and "action". The position of each motor is a number: that of the state, or that of
-    the action. So agents and plants of this library work with it. Before the first try of an action, a transition model contains an
-    imagined outcome in which the action reaches its goal. Without `goals` the result of an action is not known in advance, so its goal is
-    the state itself. Then let the agent plan with `beliefs="debiased"`, which gives little weight to the imagined outcome.
+    It is the Space of a robot with two motors, "state" and "action". The position of the first is the number of the state, the position of
+    the second the number of the action. So agents and plants of this library work with it. Before the first try of an action, a transition
+    model contains imagined outcomes: the action leaves the state unchanged, or reaches its goal. Without `goals`, the goal of an action is
+    the state in which it starts, so no imagined outcome is another state. Then give the agent the setting `beliefs="debiased"`, with which
+    the imagined outcomes have little weight in its plans.
 
     Args:
         states: number of states, at least 2.
@@ -52,7 +53,10 @@ class DiscreteSpace(Space):
         return np.array([self.goal(state, action), action], dtype=np.float64)
 
     def action_of(self, target: Array) -> int:
-        """Return the number of the action from a target that `aim` returned; raises InvalidValue for any other target."""
+        """Return the number of the action from a target (2,) that `aim` returned.
+
+        Raises InvalidValue for another shape, or if there is no such action; the state in the target is not checked.
+        """
         actions = self.goals.shape[1]
         if np.shape(target) != (2,) or target[1] not in range(actions):
             raise InvalidValue(f"target {target!r} of {self.part}: give the state that is expected and an action from 0 to {actions - 1}.")

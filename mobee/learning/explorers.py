@@ -103,17 +103,19 @@ HORIZONS = 2.0  # length of the simulated plan, in units of 1 / (1 - discount)
 
 
 def depleting(agent: Explorable, state: int, rng: np.random.Generator) -> Array:
-    """Score actions by the discounted sum of expected information gains; if scores are equal, by the gains that remain afterwards.
+    """Score actions by the discounted sum of expected information gains; if scores are nearly equal, a second plan decides.
 
     The explorer `curious` plans with the gain that the last try of each action gave. This explorer plans with the gain that is expected
     from the next try. The expectation uses the outcome probabilities of `TransitionModel.debiased`: real counts and a weak prior. If the
     outcome of an action is certain, the expected gain decreases sooner than the last gain. The gain of an action that was never tried is
     that of an imagined success.
 
-    If several actions have nearly equal scores, the best plan is simulated through its most probable outcomes, and the gains of its actions
-    are reduced as if these outcomes were observed. The remaining gains are the rewards of a second plan, whose action values decide. In
-    this second plan, a state with one untried action has a lower value than a state with sixteen untried actions. Both plans use the
-    agent's beliefs. Raises InvalidValue if the agent's divergence is neither "kail" nor "kl".
+    If the scores of several actions differ by less than 1 % of the largest gain, the first plan is simulated from the present state with
+    the most probable outcome of each action, and the gains of the simulated actions are reduced as if these outcomes were observed. The
+    reduced gains are the rewards of a second plan. The score of each of the several actions is then its expected gain plus the discounted
+    value that the second plan has after it; the other actions get -inf. In the second plan, a state with one untried action has a lower
+    value than a state with sixteen untried actions. Both plans use the agent's beliefs. Raises InvalidValue if the agent's divergence is
+    neither "kail" nor "kl".
     """
     model, actions = agent.model, len(agent.model.space.actions(state))
     if model.divergence not in DIVERGENCES:

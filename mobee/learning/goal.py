@@ -47,7 +47,7 @@ class External:
         self.reward.flags.writeable = False
 
     def combined(self, intrinsic: Array) -> Array:
-        """Return the reward for plans, for each state and action, shape (S, A); -inf where there is no action.
+        """Return the reward with which plans are computed, for each state and action, shape (S, A); -inf where there is no action.
 
         It is the external reward, or, with a weight, `intrinsic` (S, A) plus weight times the external reward.
         """

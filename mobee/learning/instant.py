@@ -25,15 +25,16 @@ class InstantPlant(ABC):
 
     @abstractmethod
     def act(self, part: str, target: Array) -> Outcome:
-        """Perform the action whose target `space.aim` returned, and return its outcome; the action counts as 1 s.
+        """Perform an action and return its outcome; the action counts as 1 s.
 
-        `part`: must be `space.part`.
+        `part`: must be `space.part`, where `space` is the plant's state space. `target`: (n_part,), as the method `space.aim` returns it
+        for a state and an action.
         """
 
     def begin(self, part: str, target: Array) -> None:
-        """Store the target of an action, from `space.aim`; `advance` performs it. Raises InvalidValue if an action is under way.
+        """Store the target of an action; `advance` performs the action. Raises InvalidValue if an action is under way.
 
-        `part`: must be `space.part`, else UnknownName is raised.
+        `part`: must be `space.part`, else UnknownName is raised. `target`: as in `act`.
         """
         self._check_part(part)
         if self._under_way is not None:

@@ -122,7 +122,7 @@ class Plans:
     def undo(self) -> None:
         """Discard the present plans, because the action for which they were made was interrupted.
 
-        Unlike after `keep`, their values are not the start of the next plans.
+        Their values are discarded too: the next plans start from the values that were last kept by `keep`.
         """
         self._made.clear()
 
@@ -159,7 +159,10 @@ class CuriousLearner:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The settings of the learner and its space, as JSON values. A store can be continued only with equal settings."""
+        """The settings of the learner and its space, as JSON values.
+
+        A store (the database of the transitions) can be continued only with equal settings.
+        """
         record = vars(self._settings) | {
             "space": self.space.settings,
             "explorer": self._first_explorer,

@@ -113,7 +113,8 @@ class Planner:
     Args:
         space: states and actions.
         beliefs: outcomes of the actions and their probabilities, e.g. `model.debiased()` of a `TransitionModel`. The probabilities of
-            `model` itself include imagined failures, so reliable actions that were rarely tried would seem unreliable.
+            `model` itself include failures that were only assumed before the first try, so reliable actions that were rarely tried would
+            seem unreliable.
         targets: one or more states.
         discount: factor per step, in [0, 1); with a smaller one, a short path is preferred more over a reliable path.
 

@@ -64,7 +64,11 @@ def _object_space(settings: Mapping[str, Any], robot: Robot) -> Space:
 
 
 def model_from(space: Space, settings: Mapping[str, Any]) -> TransitionModel:
-    """Return a transition model without observations for a space, with the settings of a `CuriousLearner`."""
+    """Return a new transition model of a space, without observations.
+
+    `settings`: as `CuriousLearner.settings` returns them; only "initial", "divergence", "forgetting" and "detector" are used. A setting
+    that is absent has the default of `TransitionModel`.
+    """
     return TransitionModel(space, **{key: settings[key] for key in ("initial", "divergence", "forgetting", "detector") if key in settings})
 
 

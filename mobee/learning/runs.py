@@ -25,9 +25,9 @@ class Runs:
     """The R hypotheses about the present run of an action, the longest run first. A run is the time since the action's outcomes changed.
 
     `weight`: (R, H) probability of each run, given each of the H hazards in HAZARDS; a hazard is the probability of a change before the
-    action is performed once more. `counts`: (R, B) number of each of the B outcomes since the run began. `suspected`: above 0 if a
-    neighbouring action seems to have changed, because this action may have changed with it. It is the increase of the probability that the
-    neighbour has changed. It is 0 again after this action is performed next.
+    action is performed once more. `counts`: (R, B) number of each of the B outcomes since the run began. `suspected`: the largest increase
+    of the probability that a neighbouring action has changed, since this action was last performed; 0 if there was none. If the neighbour
+    has changed, this action may have changed with it.
     """
 
     weight: Array
@@ -39,9 +39,10 @@ class OutcomeRuns:
     """Counts, for each action of a space, how often each outcome was observed since the outcomes of the action changed.
 
     The time since this change is the run of the action; it is not known, so each possible run has a probability. If the outcomes of an
-    action have changed, the outcomes of its neighbours may have changed too. Neighbours are the actions to the same goal, and the action
-    from this goal back to the state. The share of neighbours that change together with an action is learned. If an outcome
-    increases the probability that its action has changed by p, the probability that a neighbour has changed too is p times this share.
+    action have changed, the outcomes of its neighbours may have changed too. The neighbours of an action are the other actions with the
+    same goal state, and the action from this goal state back to the state of the action. The share of neighbours that change together with
+    an action is learned. If an outcome increases the probability that its action has changed by p, then each neighbour is assumed to have
+    changed with the probability p * share.
 
     Args:
         space: states and actions.
@@ -72,8 +73,8 @@ class OutcomeRuns:
     def observe(self, state: int, action: int, chosen: int, bins: int) -> list[tuple[int, int]]:
         """Record that an action had the outcome with the index `chosen` among its `bins` outcomes.
 
-        Return the neighbours, as (state, action), that may have changed because this action seems to have changed; none if it does not. The
-        numbers that `counts` returns for these neighbours are different now.
+        If this outcome makes a change of the action more probable, return the neighbours of the action (see the class) that were tried, as
+        (state, action): they may have changed too, and `counts` now returns other numbers for them. Otherwise return an empty list.
         """
         before = self._of(state, action, bins)
         after, evidence = self._after(before, chosen)

@@ -174,7 +174,7 @@ class Space:
 
 
 def checked_joints(robot: Robot, joints: Sequence[str]) -> tuple[Part, Ints]:
-    """Return the part of some joints, and their indices among the robot's motors.
+    """Return the part (group of motors) of `joints`, which are names of motors, and their indices among the robot's motors, (d,).
 
     Raises UnknownName, and InvalidValue unless all joints belong to one part, can move, and are given once.
     """

@@ -27,10 +27,12 @@ NEGLIGIBLE = 1e-4  # a probability
 
 
 class TabularPlant(InstantPlant):
-    """A plant for one part on which every action ends at once, at the sample of a state drawn from a table.
+    """A plant for one part on which every action ends at once, in a state that is drawn by the probabilities of a table.
 
-    It is also an `OutcomeModel`: the true model of what an agent learns on this plant. The random choice of the n-th action depends only on
-    the seed and n. To continue a run in another object, set its attributes `state` and `actions` (the number of actions so far).
+    The part is then exactly at the sample (the representative pose) of this state. In shapes, S is the number of states, A the largest
+    number of actions of a state, and B the largest number of outcomes of an action. It is also an `OutcomeModel`: the true model of what an
+    agent learns on this plant. The random choice of the n-th action depends only on the seed and n. To continue a run in another object,
+    set its attributes `state` and `actions` (the number of actions so far).
 
     Args:
         space: the states and actions.
@@ -77,13 +79,16 @@ class TabularPlant(InstantPlant):
 
     @property
     def q(self) -> Array:
-        """The positions of all motors, shape (n,), in [rad]: the part is at the sample of its state, all others are at home."""
+        """The positions of all motors, shape (n,), in [rad]: the part is at the sample (representative pose) of its state.
+
+        All other parts are at home.
+        """
         q = self.robot.home.copy()
         q[self.robot.part(self.space.part).slice] = self.space.target(self.state)
         return q
 
     def measure(self, part: str) -> Array:
-        """Return the pose of the part, the sample of its present state, shape (n_part,), in [rad]."""
+        """Return the pose of the part, shape (n_part,), in [rad]: the sample (representative pose) of its present state."""
         self._check_part(part)
         return self.space.target(self.state)
 
@@ -126,7 +131,10 @@ def ideal(space: Space) -> tuple[Ints, Array]:
 
 
 class TabularWorld(NamedTuple):
-    """A world as tables, each (S, A, B): the states in which an action may end, their probabilities, and the reward of each outcome."""
+    """A world as tables, each (S, A, B): the states in which an action may end, their probabilities, and the reward of each outcome.
+
+    S: number of states, A: largest number of actions of a state, B: largest number of outcomes of an action.
+    """
 
     outcomes: Ints
     probabilities: Array
@@ -143,7 +151,7 @@ def river_swim(length: int = 6) -> TabularWorld:
     """Return a world of `length` states in a row, with a current that pushes to the left (Strehl and Littman 2008).
 
     Action 0 (left) always succeeds; action 1 (right) mostly fails. Right in the last state has the reward 1, left in the first state 0.005.
-    A run starts in the first state. With random actions the number of steps to the last state grows as 2^length.
+    A run starts in the first state. With random actions the mean number of steps to the last state grows as 3^length.
     """
     states = np.arange(length)
     left, right = np.maximum(states - 1, 0), np.minimum(states + 1, length - 1)
@@ -181,18 +189,19 @@ def half_space(
     memory: float = 0.15,
     noise: tuple[float, float] = (0.01, 0.06),
 ) -> tuple[Ints, Array]:
-    """Return outcomes and probabilities, each (S, A, B), of a world in which a plane cuts off extreme states, as the robot's cables do.
+    """Return outcomes and probabilities, each (S, A, B), of a world in which a plane cuts off extreme poses.
 
-    An action ends at the projection of its goal onto the free side of the plane, shifted towards its start, plus normal noise. With the
-    default plane and three levels of each of the arm's four joints, in the order pitch, roll, yaw, elbow, the plane cuts off the states
-    with low pitch, high roll and high yaw: these are the states number 24, 51 and 78 of the 81 states.
+    This imitates cables that limit the robot's motion. The goal of an action is projected onto the free side of the plane, and shifted
+    towards the start of the action. The action ends in a pose that is normally distributed around this point. With the default plane and
+    three levels of each of the arm's four joints, in the order pitch, roll, yaw, elbow, the plane cuts off the states with low pitch, high
+    roll and high yaw: these are the states number 24, 51 and 78 of the 81 states.
 
     Args:
         space: a lattice.
         normal: normal of the plane, towards the forbidden side: one component for each joint, in fractions of its range.
-        depth: position of the plane along the normal. 0: through the farthest samples of states, so that it cuts off none; 1: through the
-            second farthest samples; values between are interpolated.
-        memory: fraction of the distance from the goal to the start by which the outcome is shifted.
+        depth: position of the plane along the normal. 0: through the samples (poses of states) that are farthest along the normal, so that
+            it cuts off none; 1: through the second farthest samples; values between are interpolated.
+        memory: fraction of the distance from the projected goal to the projected start by which the outcome is shifted.
         noise: standard deviation for each joint, in fractions of its range: first of actions whose goal is on the free side of the plane,
             then of all others.
     """

@@ -221,9 +221,9 @@ class TransitionModel(Tabled):
 
         Before the first try it is the gain of an imagined success. If `divergence` is a function, its value stands in place of the gain.
 
-        With the detector "run_length", an observation can also raise the gain of other actions, if the outcomes of the observed action seem
-        to have changed. These other actions are those with the same goal, and the action from this goal back to the state; their gain is
-        raised only if they have been tried.
+        With the detector "run_length", an observation can also raise the gains of other actions, if the outcomes of the observed action
+        seem to have changed. This concerns all actions of any state that have the same goal as the observed action, and the action from
+        this goal back to the state, but only actions that have been tried.
         """
         return read_only(self._reward)
 
@@ -259,10 +259,10 @@ class TransitionModel(Tabled):
 
     @property
     def totals(self) -> Array:
-        """The sum N of the counts of each state-action in the closed form of the reward (eq. 6.5), shape (S, A).
+        """The sum of the counts of each state-action, N in the closed form of eq. 6.5, (S, A); 0 where there is no action (read only).
 
-        With the divergence "kl" it contains one imagined count for each state of the space. It is 0 where there is no action. The array is
-        read only.
+        It is the sum over the bins (the distinct outcomes), imagined counts included. With the divergence "kl" it is the sum of the real
+        counts plus one imagined count for each state of the space.
         """
         return read_only(self._totals)
 
@@ -287,9 +287,9 @@ class TransitionModel(Tabled):
     def debiased(self, goal: float = 0.3, stay: float = 0.1) -> DebiasedCounts:
         """Return outcome probabilities for planning, from the real counts and a weak prior. Later observations of this model update them.
 
-        `goal`, `stay`: the prior, which replaces the imagined counts of Algorithm 8: imagined counts of an action's success (it ends in its
-        goal; above 0) and of its failure (it stays; at least 0). For the same two numbers the same object is returned. Raises InvalidValue
-        for a number out of its range.
+        `goal`, `stay`: the prior: imagined counts of an action's success (it ends in its goal; above 0) and of its failure (it stays; at
+        least 0). They replace all imagined counts of this model (see `initial`). A second call with the same two numbers returns the same
+        object. Raises InvalidValue for a number out of its range.
         """
         if not (0.0 < goal < np.inf and 0.0 <= stay < np.inf):
             raise InvalidValue(f"goal={goal!r}, stay={stay!r}: give counts, the first above 0 and the second at least 0.")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Value iteration (thesis Algorithm 7) and modified policy iteration."""
+"""Value iteration (thesis Algorithm 7), modified policy iteration, and policy iteration."""
 
 from __future__ import annotations
 
@@ -41,7 +41,8 @@ class OutcomeModel(Protocol):
 class Tabled(ABC):
     """Base of an `OutcomeModel` that caches a table of its outcomes and probabilities in the form that the compiled core reads.
 
-    A subclass sets `_table` to None when it replaces its arrays; the table is then built again. A copy of an object builds its own table.
+    A subclass sets `_table` to None when it replaces its arrays, and in a copy of the object, because the table has the addresses of the
+    arrays; the table is then built again at the next use.
     """
 
     _table: TransitionTable | None = None
@@ -122,7 +123,8 @@ def value_iteration(
 def tables(model: OutcomeModel, reward: Array, discount: float) -> tuple[Array, Ints, Array]:
     """Return a model's probabilities (S, A, B) and outcomes (S, A, B), and the reward (S, A), as contiguous arrays of float64 and int64.
 
-    An array that has its type already is not copied.
+    S: states, A: largest number of actions of a state, B: largest number of outcomes of an action. An array that is contiguous and has the
+    type already is not copied.
 
     Raises InvalidValue if the shapes do not fit or the discount is not in [0, 1).
     """

@@ -79,9 +79,10 @@ class Engine:
         return core.link_poses(self._bare, q, len(self.robot.links))
 
     def jacobians(self, q: Array, link: int, point: Array) -> Array:
-        """Return the Jacobians (B, 6, n) of a point that is fixed to a link, in the poses q (B, n) rad: linear rows, then angular.
+        """Return the Jacobians (B, 6, n) of a point that is fixed to a link, in the poses q (B, n) rad, root frame.
 
-        `link`: index of the link. `point`: (3,) m, position of the point in the root frame at zero pose.
+        The first three rows are linear [m/rad], the last three angular. `link`: index of the link. `point`: (3,) m, position of the point
+        in the root frame at zero pose.
         """
         return core.jacobians(self._bare, q, link, point)
 

@@ -58,10 +58,11 @@ class FclEngine:
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands, cut: bool = False, threads: int = 1) -> tuple[ContactTable, Array]:
         """Return all contacts in the poses q (B, n) rad, and their projection to the motors, (B, n) m^2/rad.
 
-        The projection is the sum of J^T (depth * normal) over the contacts of fields. Fields are volumes that cause repulsive forces; J is
-        the Jacobian of the contact's point. `snapshot`: the state of the world. `reaching`: the hands that reach for targets; their
-        contacts with targets are ignored. `cut`: True: a contact acts only on the motors of the touching link's own part, as in the MoBeE
-        program of 2014; False: also on the motors nearer to the base. `threads`: not used; the poses are computed one after the other.
+        The projection is the sum of J^T (factor * depth * normal) over the contacts of fields (volumes that cause repulsive forces). J is
+        the Jacobian of the contact's point; the factors (1 if `robot.least_lever` is 0) are those of `mobee.model.levers.push_factors`.
+        `snapshot`: the state of the world. `reaching`: the hands that reach for targets; their contacts with targets are ignored. `cut`:
+        True: a contact acts only on the motors of the touching link's own part, as in the MoBeE program of 2014; False: also on the motors
+        nearer to the base. `threads`: not used; the poses are computed one after the other.
         """
         transforms = link_transforms(self.robot, q)
         pairs = self._tested(snapshot, reaching)
@@ -76,10 +77,10 @@ class FclEngine:
     def contacts_of_one(self, q: bytes, snapshot: Snapshot, reaching: Hands, cut: bool = False) -> tuple[ContactTable, Array]:
         """Return the contacts of one pose, and their projection to the motors, (n,) m^2/rad.
 
-        The projection is the sum of J^T (depth * normal) over the contacts of fields. Fields are volumes that cause repulsive forces; J is
-        the Jacobian of the contact's point. `q`: the pose (n,) rad as bytes of float64. `snapshot`: the state of the world. `reaching`: the
-        hands that reach for targets; their contacts with targets are ignored. `cut`: True: a contact acts only on the motors of the
-        touching link's own part, as in the MoBeE program of 2014; False: also on the motors nearer to the base.
+        The projection is that of `contacts`: the sum of J^T (factor * depth * normal) over the contacts of fields (volumes that cause
+        repulsive forces). `q`: the pose (n,) rad as bytes of float64. `snapshot`: the state of the world. `reaching`: the hands that reach
+        for targets; their contacts with targets are ignored. `cut`: True: a contact acts only on the motors of the touching link's own
+        part, as in the MoBeE program of 2014; False: also on the motors nearer to the base.
         """
         table, torque = self.contacts(np.frombuffer(q)[None], snapshot, reaching, cut)
         return table, torque[0]
@@ -231,9 +232,10 @@ def tested_pairs(robot: Robot, snapshot: Snapshot, reaching: Hands) -> tuple[Int
     """Return the p tested pairs of volumes as three arrays (p,): first volume, second volume and kind (0 solid, 1 field).
 
     Fields are volumes that cause repulsive forces. Volumes are numbered: first the robot's shapes, then the world's objects. Pairs of the
-    robot's own shapes are those in its lists `solid_pairs` and `field_pairs`. A free object is tested against every shape except those of
-    the base; a target is not tested against the hands in `reaching`, which reach for it. An attached object counts as a solid of its link.
-    It is tested against free objects, and against the shapes and attached objects of other links, except if the pair of links is in
+    robot's own shapes are those in its lists `solid_pairs` and `field_pairs`. A free object (one that is not attached to a link) is tested
+    against every shape except those of the base; if it is a target, it is not tested against the hands in `reaching`, which reach for it.
+    The kind of a pair of a shape and an object is the role of the shape. An attached object counts as a solid of its link. It is tested
+    against free objects, and against the shapes and attached objects of other links, except if the pair of links is in
     `robot.untested`. Ghosts, objects that are only drawn, are not tested. Raises UnknownName for an object that is attached to a link which
     the robot does not have.
     """

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Levers: how much the depth of a contact changes when the motors move; and, computed from the levers, factors of repulsive pushes."""
+"""The levers of contacts, and the factors on repulsive forces that are computed from the levers.
+
+The lever of a contact is the change of its depth if the motors move by 1 rad.
+"""
 
 from __future__ import annotations
 
@@ -15,8 +18,8 @@ def lever(robot: Robot, transforms: Array, links: tuple[int, int], point: Array,
     """Return the lever of a contact of two links [m/rad]: the norm of the derivatives of its depth with respect to the motor positions.
 
     A joint that moves both links does not count. For a motor that slides, a certain length replaces 1 rad, see
-    `mobee.robot.motor_units.motor_units`. `transforms`: (L, 4, 4) of all links. `links`: indices; below 0: a free object. `point` (3,) m
-    and `normal` (3,) of the contact: root frame, in this pose.
+    `mobee.robot.motor_units.motor_units`. `transforms`: (L, 4, 4) of all links. `links`: indices; below 0: a free object (an object of
+    the world that is on no link). `point` (3,) m and `normal` (3,) of the contact: root frame, in this pose.
     """
     change = np.zeros(len(robot.motors))
     for link, sign in zip(links, (1.0, -1.0), strict=True):
@@ -31,7 +34,8 @@ def push_factors(robot: Robot, transforms: Array, links: Ints, depths: Array, po
     Fields are volumes that cause repulsive forces. The factors are 1 if `robot.least_lever` is 0. Otherwise a factor is LEVER^2 / (lever^2
     + least_lever^2) * depth / total, with LEVER = 0.5 m; the total is the sum of the depths of all contacts between the same two links.
     This is our extension of thesis eq. 5.11 (docs/law.md). `transforms`: (L, 4, 4) of all links. `links` (c, 2): indices; all free objects
-    (-1) count as one link. `depths` (c,) m, `points` (c, 3) m, `normals` (c, 3): of the contacts, root frame.
+    (-1, objects of the world that are on no link) count as one link. `depths` (c,) m, `points` (c, 3) m, `normals` (c, 3): of the contacts,
+    root frame.
     """
     factors = np.ones(len(depths))
     if robot.least_lever <= 0.0:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Computes link poses, contacts and projected contact forces for joint configurations (thesis chapter 2)."""
+"""Computes link poses, contacts, and contact forces projected to the motors, for joint configurations (thesis chapter 2)."""
 
 from __future__ import annotations
 
@@ -65,10 +65,10 @@ class Model:
     def hand(self, marker: str) -> Hand:
         """Return the hand of a marker: the links whose contacts with targets are ignored while the marker reaches; raises UnknownName.
 
-        These are the marker's link and all links that it carries. But the fields (volumes that cause repulsive forces) of links before the
-        marker's link, such as the forearm, may be so large that the marker is inside them when the robot is at home. Of these links of the
-        marker's part, take the one that is nearest to the base: the contacts of its fields with targets are ignored too, and those of the
-        fields of all links that it carries.
+        The hand is the marker's link (the link on which the marker is) and all links that this link carries. The fields (volumes that cause
+        repulsive forces) of links nearer to the base, such as the forearm, may be so large that the marker is inside them when the robot is
+        at home. If the marker's part has such links, take the one nearest to the base. Contacts of targets with its fields, and with the
+        fields of all links that it carries, are ignored too.
         """
         known = self._hand_of.get(marker)
         if known is None:
@@ -103,8 +103,8 @@ class Model:
         Args:
             q: motor positions, (n,) or (..., n) rad, in the order of robot.motors.
             threads: number of threads; each evaluates a block of a batch, and the results are bit-equal for any number.
-            reaching: the marker, or up to two markers, that reach for the targets: contacts of their hands (`Model.hand`) with targets are
-                ignored.
+            reaching: name of the marker (a named point on a link) that reaches for the targets, or names of up to two markers; contacts of
+                their hands (`Model.hand`) with targets are ignored.
 
         Raises:
             InvalidValue: q has another shape or is not finite.

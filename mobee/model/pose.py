@@ -40,9 +40,10 @@ class Engine(Protocol):
         """
 
     def jacobians(self, q: Array, link: int, point: Array) -> Array:
-        """Return the Jacobians (B, 6, n) of a point that is fixed to a link, in the poses q (B, n) rad: linear rows, then angular.
+        """Return the Jacobians (B, 6, n) of a point that is fixed to a link, in the poses q (B, n) rad, root frame.
 
-        `link`: index of the link. `point`: (3,) m, position of the point in the root frame at zero pose.
+        The first three rows are linear [m/rad], the last three angular. `link`: index of the link. `point`: (3,) m, position of the point
+        in the root frame at zero pose.
         """
 
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands, cut: bool = False, threads: int = 1) -> tuple[ContactTable, Array]:
@@ -67,7 +68,8 @@ class Engine(Protocol):
 class Pose:
     """The robot at one q, or at a batch of several q, in the world at the time of the call of `Model.evaluate`.
 
-    Every result is computed when it is first read, and kept.
+    Link transforms and contacts (`table`, `projection`) are computed when they are first read, and kept. `projection_of_part` is computed
+    at every read.
     """
 
     __slots__ = ("_contacts", "_engine", "_evaluated", "_given", "_reaching", "_snapshot", "_threads", "_transforms", "robot")

@@ -28,7 +28,8 @@ _Edges = tuple[NDArray[np.int32], NDArray[np.int32]]
 class Carried:
     """A world object that is attached to a link, as a further shape of that link.
 
-    `link`: index of the link. `row`: one row of VOLUME (`mobee.model.volumes`), in the link's frame.
+    `link`: index of the link. `row`: one row of the dtype VOLUME (`mobee.model.volumes`), in the link's frame (the root frame at zero
+    pose).
     """
 
     link: int
@@ -39,16 +40,17 @@ class Carried:
 class RobotTables:
     """The tables of a robot that core/robot.cpp reads: S shapes, sorted by their C clusters; J joints; V corners of convex shapes.
 
-    `motors`: number of motors. `own_shapes`: number of shapes without carried objects. `least_lever`: m. Joints: `parent` (J,) the link
-    that carries the joint; `slides` (J,) whether it is prismatic; `border` (J,) whether the link that the joint moves belongs to another
-    part than `parent`; `axis` (J, 3) and `point` (J, 3) m of the axis, root frame, zero pose; `motor` (K, J) indices of the motors that
-    drive the joint, at most K; `scale` (K, J) joint angle per motor angle, 0 in unused entries; `offset` (J,) joint angle while the motors
-    are at 0; `travel` (K, J) motion of the joint [rad or m] when the motor moves by its unit (`mobee.robot.motor_units.motor_units`).
-    Shapes: `volume` (S,) rows of VOLUME; `link` (S,); `name` (S,) index into the robot's shapes, then the carried objects; `field` (S,)
-    whether it is a field, which causes repulsive forces; `meets_world` (S,) whether it is tested against free objects; `cluster` (C + 1,)
-    first shape of each cluster; `tested` (S, S) whether two shapes are tested against each other. Corners: `corner` (V, 3) m, relative to
-    the position of the shape, along its axes; `edge_start` (V + 1,) index in `edge` of the first edge of each corner; `edge`: the corner at
-    the other end, as its index among the corners of the shape.
+    A cluster is a group of shapes with one bounding sphere. `motors`: number of motors. `own_shapes`: number of shapes that are not carried
+    objects. `least_lever`: m, as in `mobee.robot.robot.Robot`. Joints: `parent` (J,) the link that carries the joint; `slides` (J,) whether
+    it is prismatic; `border` (J,) whether the link that the joint moves belongs to another part than `parent`; `axis` (J, 3) and `point`
+    (J, 3) m of the axis, root frame, zero pose; `motor` (K, J) indices of the motors that drive the joint, at most K; `scale` (K, J) joint
+    angle per motor angle, 0 in unused entries; `offset` (J,) joint angle while the motors are at 0; `travel` (K, J) motion of the joint
+    [rad or m] when the motor moves by its unit (1 rad, or a length for a slide, see `mobee.robot.motor_units.motor_units`). Shapes:
+    `volume` (S,) rows of VOLUME; `link` (S,); `name` (S,) index into the robot's shapes, then the carried objects; `field` (S,) whether it
+    is a field, which causes repulsive forces; `meets_world` (S,) whether it is tested against free objects; `cluster` (C + 1,) first shape
+    of each cluster; `tested` (S, S) whether two shapes are tested against each other. Corners: `corner` (V, 3) m, relative to the position
+    of the shape, along its axes; `edge_start` (V + 1,) index in `edge` of the first edge of each corner; `edge`: the corner at the other
+    end, as its index among the corners of the shape.
     """
 
     motors: int
@@ -95,7 +97,7 @@ class RobotTables:
 
 
 def robot_tables(robot: Robot, carried: Sequence[Carried] = ()) -> RobotTables:
-    """Return the core's tables of a robot, with the objects attached to its links as further shapes.
+    """Return the tables of a robot that the compiled core reads, with the objects attached to its links as further shapes.
 
     Raises InvalidValue if an index in the robot (parent of a joint, link of a shape or marker) is out of range. `carried`: the attached
     objects.

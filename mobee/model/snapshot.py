@@ -2,8 +2,9 @@
 """What an evaluation needs in addition to q: the world as an immutable snapshot, and the hands that reach.
 
 The hand of a marker is the marker's link with all links that it carries. While the marker reaches, contacts of the hand with targets are
-ignored. If the marker is inside a field of an earlier link of the same part, contacts of the fields of that link with targets are ignored
-too: otherwise they would keep the marker away from every target.
+ignored. When the robot is at home, the marker may be inside a field (a volume that causes a repulsive force) of a link of the same part
+that is nearer to the base. Then contacts of the fields of that link with targets are ignored too; otherwise their forces would keep the
+marker away from every target.
 """
 
 from __future__ import annotations
@@ -98,7 +99,8 @@ class Hand:
 
     `link`: index of a link; contacts of its solids and fields, and of those of all links that it carries, are ignored. `fields`: index of a
     link; contacts of its fields only, and of the fields of all links that it carries, are ignored. `fields` is the same link as `link`, or
-    an earlier link of the part, nearer to the base. A field is a volume that causes a repulsive force.
+    an earlier link of the part, nearer to the base. A solid is a volume of the body of a link; a field is a larger volume that causes a
+    repulsive force.
     """
 
     link: int

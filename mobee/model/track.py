@@ -44,7 +44,7 @@ class Neighbours:
     def enter(self, snapshot: Snapshot, reaching: Hands) -> int:
         """Set the world and the reaching hands for later computations; return the memory address of the core's object `Neighbours`.
 
-        If the world or the hands have changed, the list of near pairs is made anew.
+        If the world or the hands have changed, the list of near pairs is discarded; the core makes a new one when this saves time.
         """
         scene = self._engine.scene_of(snapshot)
         known = self._known
@@ -74,9 +74,9 @@ class Track:
     def evaluate(self, q: ArrayLike, reaching: Reaching = None) -> Pose:
         """Return the pose at q (n,) rad, or the poses along a path q (..., n) rad, evaluated in this order.
 
-        `reaching`: name of the marker that reaches for the targets, or names of up to two; None: none. The contacts are computed at once,
-        not when they are read. Raises InvalidValue if q has another shape or is not finite, and UnknownName if the robot does not have the
-        marker.
+        `reaching`: name of the marker that reaches for the targets, or names of up to two; None: none. The compiled engine computes the
+        contacts at once, not when they are read. Raises InvalidValue if q has another shape or is not finite, and UnknownName if the robot
+        does not have the marker.
         """
         pose = self._model.evaluate(q, reaching=reaching)
         if self._neighbours is not None:

@@ -41,7 +41,8 @@ class Volume(Protocol):
     def size(self) -> tuple[float, ...]:
         """The lengths of the volume [m], as in `mobee.robot.robot.Shape.size`.
 
-        Sphere: radius; capsule and cylinder: radius and height; box: full edges x, y and z; convex: no lengths.
+        Sphere: radius; capsule and cylinder: radius and height (of a capsule without its caps); box: full edges x, y and z; convex: no
+        lengths.
         """
 
     @property

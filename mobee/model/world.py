@@ -140,7 +140,8 @@ class World:
 
         `relative`: position (3,) m and rotation (3, 3) of the object in the link's frame, which is the root frame at zero pose. None: the
         object keeps its place relative to the link in the pose that was last given to `follow`. (`Model.attach` has the pose as an
-        argument.) Raises UnknownName, and InvalidValue for values that are not valid or if no pose is known.
+        argument.) Raises UnknownName for an unknown object, or for an unknown link if a pose is known. Raises InvalidValue for values that
+        are not valid, or if a pose is needed and none is known.
         """
         pose = None if relative is None else (valid_position(name, relative[0]), valid_rotation(name, relative[1]))
         with self._lock:

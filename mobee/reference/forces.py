@@ -2,8 +2,8 @@
 """The forces of the control law (thesis eqs. 5.7 to 5.17), each as a function beside its equation.
 
 Every function takes the `State` of one tick and returns a force (n,), one number for each motor. The mass M of eq. 5.7 is 1, so a
-force is an acceleration in rad/s^2. For a motor that slides, 1 rad stands for its `unit` in m (`mobee.robot.motor_units`); where all
-motors turn, every unit is 1. `Gains` hold the numbers of the law and say which of its two variants is meant.
+force is an acceleration in rad/s^2. For a motor that slides, 1 rad stands for a length in m, its `unit` (`mobee.robot.motor_units`); for a
+motor that turns, the unit is 1. `Gains` contains the parameters of the law, and its variant `Gains.law`: "default" or "published_2014".
 """
 
 from __future__ import annotations
@@ -26,12 +26,14 @@ YIELD = 0.25  # rad/s^2: an opposing force of this size ends the motion with a m
 
 @dataclass(frozen=True, slots=True, eq=False)
 class State:
-    """The input of the control law in one tick; arrays (n,) in the order of `robot.motors`.
+    """The input of the control law in one tick (control period); arrays (n,) in the order of `robot.motors`.
 
-    `q`: rad, measured. `velocity`: q', rad/s, the law's own state, not a difference of encoder values. `attractor`: q*, rad. `contacts`: at
-    q, as `Model.evaluate(q).contacts` returns them. `force`: f of eq. 5.9, a client's force on the motors, rad/s^2; None: none. `pushes`:
-    f_m of eq. 5.10, by marker: force (3,), or force and moment (6,), root frame. `propagate`: "tree": a contact acts on all motors down to
-    the base; "part": on the motors of the touching part only. `goal_velocity`: q*', rad/s, of an attractor that moves; None: it is at rest.
+    `q`: rad, measured. `velocity`: q', rad/s, the law's own state, not a difference of encoder values. `attractor`: q*, rad, the pose to
+    which the spring pulls the motors. `contacts`: at q, as `Model.evaluate(q).contacts` returns them. `force`: f of eq. 5.9, the force on
+    the motors that a client (the program that uses the controller) requests, rad/s^2; None: none. `pushes`: f_m of eq. 5.10, a dict from
+    the name of a marker (a point on a link) to a force (3,), or force and moment (6,), root frame. `propagate`: "tree": a contact acts on
+    all motors down to the base; "part": on the motors of the touching part only. `goal_velocity`: q*', rad/s, velocity of the attractor;
+    None: it is at rest.
     """
 
     robot: Robot
@@ -63,7 +65,10 @@ def squash_norm(v: Array, maximum: float, slope: float) -> Array:
 
 
 def spring(s: State) -> Array:
-    """Return the pull of the attractor, L(K (q* - q)), (n,) rad/s^2, as a term on the right-hand side of eq. 5.7."""
+    """Return the force of the spring, L(K (q* - q)), (n,) rad/s^2, as a term on the right-hand side of eq. 5.7.
+
+    It pulls the motors to the attractor q* = `State.attractor`.
+    """
     return squash(s.attractor - s.q, s.gains.of_robot("max_spring", s.robot), s.gains.of_robot("stiffness", s.robot))
 
 
@@ -73,10 +78,11 @@ def damping(s: State) -> Array:
 
 
 def following(s: State, outside: Array) -> Array:
-    """Return C q*', (n,) rad/s^2, which makes the damping relative to the velocity of a moving attractor; 0 if the attractor is at rest.
+    """Return C q*', (n,) rad/s^2, which makes the damping relative to the velocity of the attractor; 0 if the attractor is at rest.
 
-    `outside` (n,) rad/s^2: the sum of all forces except spring and damping.  If the outside force on a motor opposes the velocity of its
-    attractor, C q*' of this motor is reduced in proportion to the force, and is 0 for a force of YIELD (0.25 rad/s^2) or more.
+    The attractor is the pose to which the spring pulls the motors. `outside` (n,) rad/s^2: the sum of all forces except spring and damping.
+    If this force on a motor opposes the velocity of its attractor, C q*' of this motor is reduced in proportion to the force, and is 0 for
+    a force of YIELD (0.25 rad/s^2) or more.
     """
     if s.goal_velocity is None:
         return np.zeros(len(s.q))
@@ -87,12 +93,15 @@ def following(s: State, outside: Array) -> Array:
 
 
 def config_force(s: State) -> Array:
-    """Return f_config = L(f) (eq. 5.9), (n,) rad/s^2: `bounded_client` of the force f = `State.force` that a client wants; 0 if None."""
+    """Return f_config = L(f) (eq. 5.9), (n,) rad/s^2: the client's force f = `State.force`, saturated by `bounded_client`; 0 if None."""
     return bounded_client(s.robot, s.gains, s.force) if s.force is not None else np.zeros(len(s.q))
 
 
 def work_force(s: State) -> Array:
-    """Return f_work = L(sum over markers m of J(m)^T f_m) (eq. 5.10), (n,) rad/s^2."""
+    """Return f_work = L(sum over markers m of J(m)^T f_m) (eq. 5.10), (n,) rad/s^2.
+
+    A marker is a point on a link. J(m) is its Jacobian, f_m its force (or force and moment) in `State.pushes`; `bounded_client` is L.
+    """
     torque = np.zeros(len(s.q))
     for marker, push in s.pushes.items():
         torque += marker_jacobian(s.robot, s.q, marker)[: len(push)].T @ push
@@ -100,7 +109,7 @@ def work_force(s: State) -> Array:
 
 
 def bounded_client(robot: Robot, gains: Gains, f: Array) -> Array:
-    """Saturate a client's force f (n,) rad/s^2: L of eqs. 5.9 and 5.10.
+    """Saturate the force f (n,) rad/s^2 of a client, the program that uses the controller: L of eqs. 5.9 and 5.10.
 
     With `gains.client_squash` "each", every motor is saturated separately (eq. 5.8 as printed). Otherwise the norm of the force on each
     part is saturated, so that the force on the part keeps its direction.
@@ -117,8 +126,9 @@ def bounded_client(robot: Robot, gains: Gains, f: Array) -> Array:
 def squash_together(f: Array, maximum: Array, slope: Array, unit: Array) -> Array:
     """Saturate the norm of the force f (k,) on several motors, so that it keeps its direction.
 
-    `maximum`, `slope` (k,): bound and slope at 0 of each motor, as in eq. 5.8. They give a factor for each motor; f is multiplied by the
-    smallest one. `unit` (k,): the motion of each motor that the control law treats as 1 rad (`mobee.robot.motor_units`).
+    `maximum`, `slope` (k,): bound m and slope s at 0 of each motor, as in eq. 5.8. `unit` (k,): the motion of each motor that the control
+    law treats as 1 rad (`mobee.robot.motor_units`). With m and f divided by `unit`, the factor of a motor is m / (m / s + |f|). Every
+    element of f is multiplied by the smallest factor.
     """
     length = float(np.linalg.norm(f / unit))
     shares = maximum / unit / (maximum / unit / slope + length)
@@ -128,10 +138,10 @@ def squash_together(f: Array, maximum: Array, slope: Array, unit: Array) -> Arra
 def limit_force(s: State) -> Array:
     """Return f_lim (eqs. 5.12, 5.13), (n,) rad/s^2, which pushes the motors out of the zones at their limits.
 
-    It is 0 inside [q_min + zone, q_max - zone]. Outside it is a ramp that points inward, with slope f_max / delta, and continues beyond the
-    limit. The intervals of the cases in the thesis are misprinted; here the force is continuous and points inward. A zone has the width
-    delta = `limit_width`. It is narrower for a motor with a narrow range, or if it would include the home position of a motor with
-    `zone_ends_at_home` (`mobee.robot.motor_units.limit_zones`).
+    A zone is the range beside a limit. It has the width delta = `limit_width`; it is narrower for a motor with a narrow range, or if it
+    would include the home position of a motor with `zone_ends_at_home` (`mobee.robot.motor_units.limit_zones`). The force is 0 between the
+    two zones. In a zone it is a ramp that points inward, with slope f_max / delta (f_max = `max_limit`), and continues beyond the limit.
+    The intervals of the cases in the thesis are misprinted; here the force is continuous and points inward.
     """
     width = s.gains.of_robot("limit_width", s.robot)
     (low, high), (below, above) = s.robot.limits.T, limit_zones(s.robot, width).T
@@ -166,11 +176,12 @@ def clauses_default(s: State) -> Array:
 
 
 def clauses_2014(s: State) -> Array:
-    """Return f_cst of the 2014 program, (n,) rad/s^2: the force that keeps the clauses (conditions on motor positions) satisfied.
+    """Return f_cst of the MoBeE program of 2014, (n,) rad/s^2: the force that keeps the clauses (conditions on motor positions) satisfied.
 
     A clause is a list of rows, inequalities a.q + b > 0, of which at least one must hold. The deficit of a row is 1 - (a.q + b) /
-    `constraint_width`: 1 at its boundary, 0 where the row holds with that margin. If no row of a clause has a negative deficit, each of
-    its rows pushes in proportion to its deficit. The sum is clipped to +-1 for each motor and multiplied by `max_constraint`.
+    `constraint_width`: 1 where a.q + b is 0, and 0 where it equals `constraint_width`. If no row of a clause has a negative deficit, each
+    row pushes along its unit normal in proportion to its deficit. The sum is clipped to +-1 for each motor and multiplied by
+    `max_constraint`.
     """
     unit, total = motor_units(s.robot), np.zeros(len(s.q))
     for clause in s.robot.clauses:
@@ -194,7 +205,7 @@ def projected(robot: Robot, q: Array, contacts: Iterable[Contact], propagate: Li
 
     f_g = depth * normal for the first link, and the opposite for the second. A field is a volume that causes a repulsive force; contacts
     between two solids are left out. `propagate`: "tree": a contact acts on all motors from its link down to the base; "part": only on the
-    motors of the part that touches, as in the original program. If `robot.least_lever` is above 0, f_g is multiplied by `push_factor`.
+    motors of the part that touches, as in MoBeE of 2014. If `robot.least_lever` is above 0, f_g is multiplied by `push_factor`.
     """
     frames, per_joint, contacts = link_frames(robot, q), np.zeros(len(robot.joints)), list(contacts)
     for contact in contacts:
@@ -209,14 +220,15 @@ def projected(robot: Robot, q: Array, contacts: Iterable[Contact], propagate: Li
 
 
 def push_factor(robot: Robot, frames: Array, contact: Contact, contacts: Sequence[Contact]) -> float:
-    """Return the factor by which the push of a contact of fields is multiplied; 1 for a robot without a least lever.
+    """Return the factor by which the push of a contact of fields is multiplied; 1 if `robot.least_lever` is 0.
 
     A field is a volume that causes a repulsive force, the push. If `robot.least_lever` is above 0, the factor is LEVER^2 / (|J|^2 +
     least_lever^2), with LEVER = 0.5 m, times the depth of the contact divided by the sum of the depths of all contacts of fields between
-    the same two links. J (n,): the derivative of the depth with respect to each motor (m/rad; for a slide, m per `motor_units`). |J| is the
-    lever of the contact. Without the factor, J^T pushes weakly if the lever is short. With it, the push is proportional to the smallest
-    motion that ends the contact, J^T depth / |J|^2, if |J| is well above least_lever. All contacts between two links together push like
-    one. `frames`: (L, 4, 4), as from `link_frames`. `contacts`: all contacts of the pose.
+    the same two links. J (n,): the derivative of the depth with respect to each motor, in m/rad; for a slide, 1 rad stands for the length
+    in `motor_units`. |J| is the lever of the contact. Without the factor, J^T pushes weakly if the lever is short. With it, the push is
+    proportional to the smallest motion that ends the contact, J^T depth / |J|^2, if |J| is well above least_lever. The depths in the
+    factor are weights, so that all contacts between two links together push about as strongly as a single one. `frames`: (L, 4, 4), as from
+    `link_frames`. `contacts`: all contacts of the pose.
     """
     if robot.least_lever == 0.0:
         return 1.0
@@ -233,9 +245,9 @@ def push_factor(robot: Robot, frames: Array, contact: Contact, contacts: Sequenc
 def bounded_contact(robot: Robot, gains: Gains, torque: Array) -> Array:
     """Saturate the norm of the contact force on each part (L of eq. 5.11, in the form of eq. 5.8); returns (n,) rad/s^2.
 
-    `torque`: the sum in eq. 5.11, (n,) m^2/rad, which is first multiplied by `gains.contact_gain`. If `gains.law` is "published_2014", as
-    in the MoBeE program of 2014, this product is then multiplied by its own norm, so that its norm is squared. The result is taken in
-    deg/s^2, converted to rad/s^2 and then saturated.
+    `torque`: the sum in eq. 5.11, (n,) m^2/rad. The force before saturation is `torque` times `gains.contact_gain`. Only if `gains.law` is
+    "published_2014", this product is multiplied by its norm in each part, so that the norm is squared; the result is in deg/s^2, as in the
+    MoBeE program of 2014, and is converted to rad/s^2.
     """
     unit = motor_units(robot)
     force = gains.contact_gain * torque * unit

@@ -63,8 +63,8 @@ class Motion:
 def acceleration(state: State, terms: Sequence[Term] = TERMS) -> Array:
     """Return q" of eq. 5.7 with mass 1, (n,) rad/s^2: the sum of all terms, plus C q*' for an attractor that moves.
 
-    `terms`: the forces, each a function of the state. Every function except `spring` and `damping` themselves counts as an outside force,
-    and outside forces reduce the term C q*' (`following`). Therefore a copy or a wrapper of these two must not be used.
+    `terms`: the forces, each a function of the state. The sum of all forces except `spring` and `damping` reduces the term C q*' where it
+    opposes q*' (`following`). A copy or a wrapper of `spring` or `damping` would be counted in this sum, so do not use one.
     """
     total, outside = np.zeros(len(state.q)), np.zeros(len(state.q))
     for term in terms:
@@ -132,9 +132,9 @@ def torque(robot: Robot, motion: Motion, q: Array) -> Array:
 def is_settled(robot: Robot, gains: Gains, motion: Motion, part: str) -> bool:
     """Return whether a part has settled (thesis 6.1): its motors have small commanded velocities and accelerations.
 
-    The velocity of each must be at most `gains.settle.speed`, and the acceleration at most `gains.settle.acceleration`. For a slide, both
-    bounds are multiplied by its `fine_units`. The caller checks this `first_check` s after the action began, then every `interval` s, until
-    `timeout`.
+    The velocity of each must be at most `gains.settle.speed`, and the acceleration at most `gains.settle.acceleration`. For a motor that
+    slides, both bounds are multiplied by its number in `mobee.robot.motor_units.fine_units` (m per rad). The caller calls this function
+    `gains.settle.first_check` s after the action began, then every `interval` s, until `timeout` s.
     """
     where, unit = robot.part(part).slice, fine_units(robot)
     slow = np.abs(motion.velocity) <= gains.settle.speed * unit

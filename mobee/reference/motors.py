@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The motors of a simulated robot: delay, lag, friction, play, hard stops, encoder noise (docs/plant.md).
 
-Each has a motor side and a joint side, with play between them. The encoders measure the joint side.
+Each has a motor side and a joint side, the input and the output of its gear, with play (backlash) between them. The encoders measure the
+joint side.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ WORD = 2**64 - 1  # mask of 64 bits
 
 @dataclass(slots=True, eq=False)
 class MotorState:
-    """The state of all n motors of a robot; arrays (n,). A motor has a motor side and a joint side, with play between them.
+    """The state of all n motors of a robot; arrays (n,). A motor has a motor side and a joint side (input and output of its gear).
 
     `q` (rad), `velocity` (rad/s): of the joint side. `motor_q`, `motor_velocity`: of the motor side. `mode`: "position", "velocity",
     "torque" or "hold". `reference`: the command, in rad (position), rad/s (velocity) or N m (torque). `resting`: whether a motor in hold
@@ -84,7 +85,8 @@ def command(s: MotorState, where: slice, mode: str, reference: Array | None = No
 def drive(robot: Robot, parameters: MotorParameters, s: MotorState, dt: float) -> Array:
     """Advance the motor sides by a substep of dt [s]; return the positions (n,) rad to which they push the joint sides.
 
-    A joint side moves only if the motor side has reached the end of the play; in torque mode there is no play.
+    Motor side and joint side are the input and the output of a gear, with play between them. A joint side moves only if the motor side has
+    reached the end of the play; in torque mode there is no play.
     """
     fastest = np.array([motor.max_velocity for motor in robot.motor_table])
     hardest = np.array([motor.max_acceleration for motor in robot.motor_table])
@@ -123,8 +125,8 @@ def velocity_response(s: MotorState, asked: Array, lag: Array, friction: Array, 
 def torque_response(s: MotorState, asked: Array, friction: Array, fastest: Array, hardest: Array, dt: float) -> Array:
     """Return the velocity (n,) rad/s after a substep of dt [s] under the torque tau = `asked` (n,) N m.
 
-    I dv/dt = tau - load - B v - B friction sign(v), with the inertia I, the viscous friction B and `friction` (n,) rad/s. `fastest` (n,)
-    rad/s and `hardest` (n,) rad/s^2 bound velocity and acceleration.
+    I dv/dt = tau - load - B v - B friction sign(v), with the load of `s`, `friction` (n,) rad/s, and the control law's inertia I = 0.5 kg
+    m^2 and viscous friction B = 5 N m s/rad. `fastest` (n,) rad/s and `hardest` (n,) rad/s^2 bound velocity and acceleration.
     """
     push = np.clip((asked - s.load - VISCOUS * s.motor_velocity) / INERTIA, -hardest, hardest)
     slowed = nearer_to_zero(s.motor_velocity + push * dt, VISCOUS * friction / INERTIA * dt)
@@ -151,8 +153,9 @@ def nearer_to_zero(x: Array, by: Array) -> Array:
 def adopt(robot: Robot, parameters: MotorParameters, s: MotorState, q: Array, dt: float) -> None:
     """Set the positions q (n,) rad of the joint sides at the end of a substep of dt [s], and their velocities, in place.
 
-    The motor side stays within half the play of the joint side, so if the joint is blocked, the motor side stops too. In torque mode the
-    motor side takes over the position and the velocity of the joint side.
+    Motor side and joint side are the input and the output of a gear. The motor side is moved to within half the play of the joint side, so
+    if the joint is blocked, the motor side stops too. In torque mode the motor side takes over the position and the velocity of the joint
+    side.
     """
     torque, half = s.mode == "torque", parameters.of_robot("backlash", robot) / 2.0
     s.velocity, s.q = (q - s.q) / dt, q
@@ -166,9 +169,11 @@ def substep(robot: Robot, parameters: MotorParameters, s: MotorState, dt: float)
 
 
 def encoders(robot: Robot, parameters: MotorParameters, s: MotorState, seed: int, k: int, dt: float) -> Array:
-    """Return the encoder values (n,) rad at tick k, with white noise that depends on `seed`.
+    """Return the encoder values (n,) rad, the positions of the joint sides, at tick k, with white noise that depends on `seed`.
 
-    The noise of a tick is scaled by 1 / sqrt(dt), so that its spectral density does not depend on the length dt [s] of a tick.
+    A tick is one period of the controller, of length dt [s]. The standard deviation of the noise is `parameters.encoder_noise` times
+    `fine_units` for ticks of 20 ms, and proportional to 1 / sqrt(dt) for others, so that the spectral density of the noise does not depend
+    on dt.
     """
     strength = parameters.encoder_noise * math.sqrt(NOISE_PERIOD / dt) * fine_units(robot)
     read: Array = s.q + strength * np.array([normal(seed, k, motor) for motor in range(len(s.q))])

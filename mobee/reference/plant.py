@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A plant in plain Python, tick by tick: robot, motors, model and law, with the control law as a list of terms.
+"""A simulated robot in plain Python, tick by tick: motors, model, and the control law as a list of forces.
 
-It is for trying a new force before the force is compiled (`mobee.reference.law`). It is hundreds of times slower than
+It is for trying a new force (see `mobee.reference.law`) before the force is compiled. It is hundreds of times slower than
 `mobee.OfflinePlant`, with the same numbers up to rounding.
 """
 
@@ -23,7 +23,10 @@ ROUNDING = 1e-9  # s: tolerance of times, which are sums of ticks
 
 
 class Plant:
-    """A plant whose motors receive velocity commands, as in the original program; a command moves the motors from the next tick on."""
+    """A simulated robot whose motors receive velocity commands, as in the MoBeE program of 2014.
+
+    A command moves the motors from the next tick on.
+    """
 
     def __init__(
         self,

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """The force that pulls a marker to a target with one part or the whole body (thesis 5.1, 8.2).
 
-Published law: J^T f, with f proportional to the distance of the marker, saturated like a client's force (eq. 5.9). The attractor's spring
-pulls against it.
+Published law: J^T f, with f proportional to the distance of the marker. It is saturated (eq. 5.9) like a client's force, the force that the
+program that uses the controller requests. The attractor's spring pulls against it.
 
 Default law: J^T control oscillates if the motors execute commands with a delay, because its stiffness depends on the pose: the stiffness is
 J J^T plus, for a far target, a term from the curvature of the marker's path. J^T control also stops in singular poses (thesis 5.1).
 Therefore the marker is pulled at the same RATE in every direction, by (J E J^T + damping)^-1 e, where e is the remaining error and E the
 mobility of the motors (`motor_mobility`). The force leads out of a singular pose along a direction in which the error has negative
-curvature. If the forces at limits, clauses and contacts oppose the motion, it continues along them as along a wall. The attractor's spring
-is removed while the reach lasts.
+curvature. If the forces at limits, clauses (conditions on motor positions) and contacts oppose the motion, its component against them is
+reduced, so that it slides along them. The attractor's spring is removed while the reach lasts.
 """
 
 from __future__ import annotations
@@ -90,7 +90,8 @@ class View:
     """The errors of a reaching marker in a pose, and the derivatives of its position and rotation.
 
     `error`: (3,) m, from the marker to its goal. `turn`: (3,) n x n*, the axis about which the normal n should turn to the wanted normal
-    n*. `facing`: n . n*. `columns`: (k, 6), velocity and angular velocity of the marker for each of the k joints between base and marker.
+    n*; for a target that the marker shall face, it is reduced within FACING (2 cm) of the target's centre. `facing`: n . n*. `columns`:
+    (k, 6), velocity and angular velocity of the marker for each of the k joints between base and marker.
     `drives`: (k, m), motion of these joints when one of the m pulled motors (`Reach.motors`) moves by 1 rad (a slide: by its
     `motor_units`).
     """
@@ -128,7 +129,7 @@ def view(r: Reach, q: Array) -> View:
 def reach_force(r: Reach, s: State, dt: float, against: Array) -> Array:
     """Return the force of a reach as a term of eq. 5.7, (n,) rad/s^2, and update the state of the reach.
 
-    `dt`: the tick [s]. `against` (n,) rad/s^2: the sum of all other forces except the springs.
+    `dt`: length of the tick [s]. `against` (n,) rad/s^2: the sum of all other forces except the attractor's spring and the damping.
     """
     total, seen = np.zeros(len(s.q)), view(r, s.q)
     if r.gains.law == "published_2014":
@@ -142,9 +143,10 @@ def reach_force(r: Reach, s: State, dt: float, against: Array) -> Array:
 
 
 def bounded(r: Reach, force: Array) -> Array:
-    """Saturate a force on the m pulled motors, (m,) rad/s^2, with the gains for a client's force, `max_client` and `client_slope`.
+    """Saturate a force on the m pulled motors, (m,) rad/s^2, with the gains `max_client` and `client_slope`.
 
-    Returns (m,) rad/s^2; for a motor that slides, m/s^2 (`mobee.robot.motor_units`).
+    These are the gains for a client's force, which the program that uses the controller requests. Returns (m,) rad/s^2; for a motor that
+    slides, m/s^2 (`mobee.robot.motor_units`).
     """
     maximum, slope = (r.gains.of_robot(name, r.robot)[r.motors] for name in ("max_client", "client_slope"))
     unit = motor_units(r.robot)[r.motors]
@@ -167,9 +169,9 @@ def published(r: Reach, v: View) -> Array:
 def drawn(r: Reach, v: View, s: State, dt: float, against: Array) -> tuple[Array, Array]:
     """Return the force of the default law on the m pulled motors, (m,), not yet saturated, and a shift of their positions, (m,) rad.
 
-    The caller adds the force of a spring that is extended by the shift: it moves the motors out of a singular pose. In other poses the
-    shift is 0.  `dt`: the tick [s]. `against` (n,) rad/s^2: the sum of all other forces except the springs. The state of the reach is
-    updated.
+    The shift leads out of a singular pose; in other poses it is 0. The caller adds the force that a spring extended by the shift exerts.
+    `dt`: length of the tick [s]. `against` (n,) rad/s^2: the sum of all other forces except the attractor's spring and the damping. The
+    state of the reach is updated.
     """
     jacobian, error = rows(r, v)
     note_error(r, error, dt)
@@ -198,10 +200,10 @@ def rows(r: Reach, v: View) -> tuple[Array, Array]:
 
 
 def note_error(r: Reach, error: Array, dt: float) -> None:
-    """Update the averaged error of the reach with `error` [m], and the time since the last decrease of its norm (`Reach.since`).
+    """Update the averaged error of the reach, and the time since the last decrease of its norm (`Reach.since`).
 
     A decrease counts if the norm falls more than BETTER (0.5 mm) below `Reach.best`, its value at the last such decrease. The average
-    is exponential with the time constant SMOOTH (0.25 s). `dt`: the tick [s].
+    is exponential with the time constant SMOOTH (0.25 s). `error` (3,) or (6,) m: the new error, from `rows`. `dt`: length of the tick [s].
     """
     seen = r.seen[: len(error)]
     seen += (min(1.0, dt / SMOOTH) if r.best < math.inf else 1.0) * (error - seen)
@@ -225,11 +227,11 @@ def motor_mobility(r: Reach, q: Array, slope: Array) -> Array:
 
 
 def pushed(r: Reach, v: View, marker_mobility: Array, pull: Array, mobility: Array) -> Array:
-    """Return the force on the marker, (rows,): (J E J^T / size + damping)^-1 pull, with enough damping for a stable motion.
+    """Return the force on the marker, (k,): (J E J^T / size + damping)^-1 pull, with enough damping for a stable motion.
 
-    `marker_mobility` (rows, rows): J E J^T / size, where size is the norm of J E J^T. `pull` (rows,): the wanted velocity of the marker,
-    divided by size. `mobility` (m,): E, from `motor_mobility`. The damping is doubled until the largest eigenvalue of `bend_of_path`, a
-    rate, is below RATE (5 1/s).
+    k is 3, or 6 if a normal is wanted, as in `rows`. `marker_mobility` (k, k): J E J^T / size, where size is the norm of J E J^T. `pull`
+    (k,): the wanted velocity of the marker, divided by size. `mobility` (m,): E, from `motor_mobility`. The damping is doubled until the
+    largest eigenvalue of the matrix `bend_of_path` [1/s] is below RATE (5 1/s).
     """
     soft = SOFT
     while True:
@@ -275,11 +277,12 @@ def largest_eigenvalue(matrix: Array, mobility: Array, turns: int) -> tuple[floa
 
 
 def along_walls(r: Reach, v: View, s: State, against: Array, force: Array, mobility: Array, size: float, pull: Array) -> Array:
-    """Return the force of the reach on the m pulled motors, (m,), with a smaller component against limits and other forces.
+    """Return the force of the reach on the m pulled motors, (m,), with a reduced component against the forces at limits and contacts.
 
-    The stronger these forces are, the smaller is the component. So the motors slide along limits and contacts as along a wall. `against`
-    (n,) rad/s^2: the sum of all other forces except the springs. `force` (m,): the force of the reach before this change. `mobility` (m,):
-    E, from `motor_mobility`. `size`: norm of J E J^T. `pull` (rows,): the wanted velocity of the marker, divided by `size`.
+    The stronger these opposing forces are, the smaller the component is, so that the motors slide along limits and contacts. `against`
+    (n,) rad/s^2: the sum of all other forces except the attractor's spring and the damping. `force` (m,): the force of the reach before
+    this change. `mobility` (m,): E, from `motor_mobility`. `size`: norm of J E J^T. `pull` (3,) or (6,): the wanted velocity of the marker,
+    divided by `size`.
     """
     jacobian, unit = rows(r, v)[0], motor_units(r.robot)[r.motors]
     limit = limit_force(s)[r.motors]
@@ -327,7 +330,7 @@ def escape_direction(r: Reach, q: Array, mobility: Array, size: float) -> Array:
 def slope_at(r: Reach, q: Array) -> Array:
     """Return J^T e at q (n,) rad, (m,), with the Jacobian J and the error e of `rows`.
 
-    For an error of the position, it is the derivative of -|e|^2 / 2 with respect to each of the m pulled motors.
+    If no normal is wanted, it is the derivative of -|e|^2 / 2 with respect to each of the m pulled motors.
     """
     jacobian, error = rows(r, view(r, q))
     slope: Array = jacobian.T @ error

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cameras of pictures: parallel (the scale is the same at every distance) or perspective (as an eye)."""
+"""Cameras of rendered pictures: orthographic (parallel rays, so that the scale is the same at every distance) or perspective."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Camera:
         width: columns.
         height: rows.
         eye: (3,) m, root frame, where the rays of a perspective picture begin; corner and scale then belong to the plane 1 m ahead of it.
-            None: the rays are parallel.
+            None: the camera is orthographic, that is, its rays are parallel.
     """
 
     axes: Array
@@ -56,7 +56,7 @@ class Camera:
         return replace(self, scale=self.scale * times, width=self.width * times, height=self.height * times)
 
     def pixels(self, points: Array) -> Array:
-        """Return the column and row (..., 2), from the upper left corner, of points (..., 3) m, root frame; for parallel cameras only."""
+        """Return the column and row (..., 2), from the upper left corner, of points (..., 3) m, root frame; orthographic cameras only."""
         flat = points @ self.axes[:2].T - self.corner
         found: Array = self.scale * flat * np.array([1.0, -1.0])
         return found
@@ -96,7 +96,7 @@ def camera_axes(view: str | tuple[float, float]) -> Array:
 
 
 def framing(axes: Array, solids: Sequence[Solid], points: Array, height: int, margin: float = MARGIN) -> Camera:
-    """Return the parallel camera whose picture shows all solids and points (P, 3) m, root frame, with a margin around them.
+    """Return the orthographic camera whose picture shows all solids and points (P, 3) m, root frame, with a margin around them.
 
     `axes`: (3, 3), rows right, up and ahead of the camera. `height`: rows of the picture. `margin`: m.
     """
@@ -116,7 +116,7 @@ class Raster:
         depth: (H, W) m along the camera's axis, from the eye or, with parallel rays, from the root frame's origin; infinite where there is
             nothing.
         normal: (H, W, 3), of the surface, root frame.
-        which: (H, W), index of the solid in the list `solids`; -1 where there is nothing.
+        which: (H, W), index of the solid in the constructor's argument `solids`; -1 where there is nothing.
         group: (H, W), `Solid.group` of the solid: solids with the same number have no outline between them. -1 where there is nothing.
         color: (H, W, 3), of the solid, 0 to 1.
     """
@@ -132,12 +132,12 @@ class Raster:
         self.color: Floats = colors[self.which]
 
     def points(self) -> Floats:
-        """Return the visible surface points (N, 3) m, root frame, one for each pixel that shows a surface; for parallel cameras only."""
+        """Return the visible surface points (N, 3) m, root frame, one for each pixel that shows a surface; orthographic cameras only."""
         return places(self.camera, self.depth, np.isfinite(self.depth))
 
 
 def places(camera: Camera, depth: Floats, which: NDArray[np.bool_]) -> Floats:
-    """Return the points (N, 3) m, root frame, that the pixels `which` (H, W) of a parallel camera show at the depths (H, W) m."""
+    """Return the points (N, 3) m, root frame, that the pixels `which` (H, W) of an orthographic camera show at the depths (H, W) m."""
     right, up = pixel_middles(camera)
     rows, columns = np.nonzero(which)
     found: Floats = np.stack([right[columns], up[rows], depth[which]], axis=1) @ camera.axes.astype(np.float32)

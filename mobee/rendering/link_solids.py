@@ -38,9 +38,10 @@ class LinkSolid:
     collides: bool
 
     def at(self, transforms: Array, white: float = 0.0) -> Solid:
-        """Return the solid at the present pose of its link.
+        """Return the solid in the root frame, moved with its link to the robot's present pose.
 
-        `transforms`: (L, 4, 4) of all links, from `link_transforms`. `white`: share of white that is mixed into its colour, 0 to 1.
+        `transforms`: (L, 4, 4), transforms of all links from the zero pose to the present pose, as `Pose.transforms`. `white`: share of
+        white that is mixed into its colour, 0 to 1.
         """
         link = transforms[self.link]
         red, green, blue = (white + (1.0 - white) * channel for channel in self.solid.color)

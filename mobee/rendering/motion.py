@@ -77,7 +77,7 @@ def motion_through(model: Model, q: ArrayLike, times: Sequence[float] | None = N
 
 
 class Recording:
-    """Keeps poses of an offline plant: the pose when the recording is made, and the pose at each call of `add`."""
+    """Keeps poses of an offline plant (a simulated robot): the pose when the recording is made, and the pose at each call of `add`."""
 
     def __init__(self, plant: OfflinePlant) -> None:
         self._plant = plant

@@ -48,9 +48,10 @@ def room(seed: int, colors: Sequence[Color] = (RED,)) -> list[Solid]:
 
 
 def clutter(objects: Iterable[WorldObject], seed: int, colors: Sequence[Color] = (RED,)) -> list[Solid]:
-    """Return sheets and discs of paper that lie flat on the boxes among the world's `objects`, so that no hand collides with them.
+    """Return sheets and discs of paper, 1 mm thick, that lie on the obstacles of kind "box" among the world's `objects`.
 
-    A quarter of them have one of `colors` (red, green, blue, 0 to 1). `seed`: seed of the random choices.
+    They are only drawn and have no contacts. A quarter of them have one of `colors` (red, green, blue, 0 to 1), the colours of the objects
+    that are searched. `seed`: seed of the random choices.
     """
     rng = np.random.default_rng([seed, _STREAM, 1])
     solids = []

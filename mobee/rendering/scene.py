@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The scene that cameras see: the robot as its file draws it, and the world around it."""
+"""The scene that cameras see: the visuals of the robot's links (or their solids, if they have none), and the objects of the world."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ LAMP = Lamp((0.37, -0.24, 0.90), ambient=0.65, diffuse=0.4, nothing=BACKGROUND) 
 class Pixels:
     """A selection of K pixels of a view; the ray of each pixel is computed once, also if the pixel is selected several times.
 
-    `chosen`: the pixels whose rays are computed; None: all pixels of the view. The computed rays are numbered from 0, row by row. `rays`:
-    (K,), for each selected pixel the number of its ray.
+    `chosen`: the pixels whose rays are computed, in the form that the compiled core reads; None: all pixels of the view. The computed rays
+    are numbered from 0, row by row. `rays`: (K,), for each selected pixel the number of its ray.
     """
 
     chosen: Chosen | None

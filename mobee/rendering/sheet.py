@@ -155,7 +155,7 @@ def marker_cloud(
 
 
 def cloud_solids(pose: Pose, places: Array, values: Array) -> list[Solid]:
-    """Return the solids of a picture: the robot in a pose, the world around it, and points `places` (P, 3) m as small balls.
+    """Return the solids (volumes to draw) for the robot in a pose, the world around it, and points `places` (P, 3) m, root frame, as balls.
 
     `values`: (P,), a number for each point, which determines its colour: blue for the smallest, orange for the largest number.
     """

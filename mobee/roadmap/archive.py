@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Roadmap files: one .npz of plain arrays with the world and digests of robot and world, written completely or not at all."""
+"""Roadmap files (.npz): the arrays of a roadmap, its world, and digests (hashes) of robot and world; written completely or not at all."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ _DIGITS, _DECIMALS = 16, 9
 def robot_digest(robot: Robot) -> str:
     """Return a hash (16 hex digits) of all properties that determine a robot's poses and contacts.
 
-    The names of motors and markers are included, since costs and tasks refer to them. The names of the robot, its links and its shapes are
-    not included, and the motors' speeds are not included.
+    Masses, and the names of motors and markers, are included too, since costs and tasks refer to them. The names of the robot, its links
+    and its shapes are not included, and the motors' speeds are not included.
     """
     parts: list[bytes] = [b"robot"]
     for joint in robot.joints:
@@ -86,9 +86,10 @@ def world_as_json(world: World) -> list[dict[str, Any]]:
 
     Each object is a dict: "name"; "kind" and "size" (list of lengths in m) of its shape, as in `mobee.model.world_object.Geometry`;
     "position" (3 numbers, m) and "rotation" (3 rows of 3 numbers), in the root frame, or in the frame of the link that carries the object;
-    "role": "obstacle", "target" or "ghost"; "color": red, green, blue and opacity, each 0 to 1, or None; "link": name of the link that
-    carries the object, or None. "mass" [kg] is included only for an object that has one, and "friction" only if it is not the usual 0.5:
-    earlier versions of this library do not know these two, and ignore them.
+    "role": "obstacle" (repels the robot), "target" (repels it, except the hand that reaches for it) or "ghost" (only drawn); "color": red,
+    green, blue and opacity, each 0 to 1, or None; "link": name of the link that carries the object, or None. "mass" [kg] is included only
+    for an object that has one, and "friction" only if it is not the usual 0.5: earlier versions of this library do not know these two, and
+    ignore them.
     """
     return [
         {

@@ -138,9 +138,9 @@ _MARGIN = 1e-6  # m
 
 
 class EdgeWatch:
-    """Keeps the check of edges up to date while the world changes.
+    """Checks which edges (straight lines in joint space between two poses) are free of contacts, again after each change of the world.
 
-    The attribute `free` (E,) says whether each edge was free of contacts at the last `update`.
+    The attribute `free` (E,) is True for each edge that was free of contacts between solids at the last `update`.
 
     Args:
         model: its solid shapes are checked.

@@ -20,7 +20,8 @@ from mobee.roadmap.edges import check_edges
 def nearest(y: Array, spacing: ArrayLike, count: int) -> Ints:
     """Return edges (E, 2) from each of V vertices to the `count` vertices nearest to it.
 
-    Distances are Euclidean in y (V, m) / spacing. Each edge occurs once, its lower vertex first, and the edges are sorted. Raises
+    `y`: (V, m) coordinates of the vertices. `spacing`: the difference in each coordinate that counts as distance 1, (m,), or one number for
+    all: distances are Euclidean in y / spacing. Each edge occurs once, its lower vertex first, and the edges are sorted. Raises
     InvalidValue if `count` is below 1.
     """
     if count < 1:
@@ -42,7 +43,8 @@ def nearest(y: Array, spacing: ArrayLike, count: int) -> Ints:
 def nearest_before(y: Array, spacing: ArrayLike, count: int) -> Ints:
     """Return edges (E, 2) from each of V vertices to the `count` nearest vertices with a lower number, as in thesis Algorithm 4.
 
-    Distances are Euclidean in y (V, m) / spacing. The graph is connected. With `count` = m, a vertex and its neighbours are the m + 1
+    `y`: (V, m) coordinates of the vertices. `spacing`: the difference in each coordinate that counts as distance 1, (m,), or one number for
+    all: distances are Euclidean in y / spacing. The graph is connected. With `count` = m, a vertex and these m vertices are the m + 1
     corners of a simplex (m = 2: a triangle). Each edge occurs once, its lower vertex first, and the edges are sorted.
     """
     places = y / np.asarray(spacing)

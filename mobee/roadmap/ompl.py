@@ -106,8 +106,8 @@ def connected(checker: ValidityChecker, start: Array, ends: Array, seed: int, ex
 
     Args:
         checker: decides which poses and motions are valid.
-        start: (d,) rad; may lie outside the checker's box.
-        ends: (G, d) rad, the goal poses; may lie outside the box.
+        start: (d,) rad; may lie outside the limits `checker.box`.
+        ends: (G, d) rad, the goal poses; may lie outside these limits.
         seed: of all random numbers.
         extensions: number of extensions of the trees after which the search ends without a path.
     """
@@ -148,7 +148,7 @@ def connected(checker: ValidityChecker, start: Array, ends: Array, seed: int, ex
 def grown(
     kind: str, checker: ValidityChecker, milestones: int, neighbours: int | None, seed: int, resolution: float | None = None
 ) -> Grown:
-    """Grow a probabilistic roadmap over the checker's box until it has `milestones` vertices.
+    """Grow a probabilistic roadmap until it has `milestones` vertices; they are drawn between the limits `checker.box`.
 
     Args:
         kind: OMPL's planner, "PRM" or "PRMstar".
@@ -156,8 +156,8 @@ def grown(
         milestones: number of vertices.
         neighbours: number of nearest vertices to which the planner tries to join each vertex; None: the planner's own rule.
         seed: of the samples.
-        resolution: OMPL checks single poses of each motion at this distance from each other; 1 is the range of a joint. None: the checker
-            checks each motion as a whole (`sound_motion`).
+        resolution: OMPL checks single poses of each motion, at most this Euclidean distance apart, with each joint position in units of the
+            joint's range (`checker.span`). None: the checker checks each motion as a whole (`sound_motion`).
 
     Raises:
         OmplMissing: OMPL is not installed.
@@ -246,7 +246,9 @@ def rrt_connect(
     extensions: int = EXTENSIONS,
     step: float = STEP,
 ) -> Array | None:
-    """Find a path without solid contacts from a pose to one of several goal poses, by RRT-Connect (Kuffner and LaValle 2000).
+    """Find a path from a pose to one of several goal poses, by RRT-Connect (Kuffner and LaValle 2000).
+
+    On the path the solids (volumes of the robot's body) have no contacts; fields, larger volumes that cause repulsive forces, are ignored.
 
     Args:
         model: robot and world.
@@ -278,7 +280,9 @@ def prm(
     seed: int = 0,
     step: float = STEP,
 ) -> Grown:
-    """Grow a probabilistic roadmap of poses and motions without solid contacts (Kavraki et al. 1996).
+    """Grow a probabilistic roadmap (Kavraki et al. 1996). In its poses and motions the solids, volumes of the body, have no contacts.
+
+    Fields, larger volumes that cause repulsive forces, are ignored.
 
     Args:
         model: robot and world.
@@ -303,7 +307,9 @@ def prm_star(
     seed: int = 0,
     step: float = STEP,
 ) -> Grown:
-    """Grow a roadmap of poses and motions without solid contacts with PRM* (Karaman and Frazzoli 2011).
+    """Grow a roadmap with PRM* (Karaman and Frazzoli 2011). In its poses and motions the solids, volumes of the body, have no contacts.
+
+    Fields, larger volumes that cause repulsive forces, are ignored.
 
     The number of neighbours that PRM* chooses makes paths asymptotically optimal.
 

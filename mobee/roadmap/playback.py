@@ -330,9 +330,9 @@ def attractors(robot: Robot, wanted: Reference, gains: Gains, forces: Callable[[
 
 
 def attractor_for(robot: Robot, gains: Gains, q: Array, force: Array) -> Array:
-    """Return the attractor (n,) rad whose spring has the force `force` (n,) rad/s^2 on the motors at the posture q (n,) rad (eq. 5.7).
+    """Return the attractor (n,) rad for which the law's spring exerts `force` (n,) rad/s^2 at the posture q (n,) rad (eq. 5.7).
 
-    The attractor is the position to which the control law's spring pulls. Forces are reduced to at most 0.8 of the spring's largest force,
+    The attractor is the position to which the spring pulls the motors. Forces are reduced to at most 0.8 of the spring's largest force,
     and the attractor is clipped to the motors' limits.
     """
     strength, stiffness = (gains.of_robot(name, robot) for name in ("max_spring", "stiffness"))

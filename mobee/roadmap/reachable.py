@@ -55,7 +55,7 @@ def nearest_posture(model: Model, part: str, marker: str, position: Array, q: Ar
 def body_at(model: Model, part: str, position: Array, q: Array) -> str | None:
     """Return the name of a link whose solid shapes contain `position` (3,) m, root frame, in the posture q (n,) rad; None if there is none.
 
-    Links that the part moves are ignored.
+    Links that the part moves are ignored, and so are the shapes `Robot.base_shapes`, which are never tested against world objects.
     """
     robot, world = model.robot, World()
     world.add("place", sphere(POINT), position=position)
@@ -68,7 +68,7 @@ def body_at(model: Model, part: str, position: Array, q: Array) -> str | None:
 def nearest_outside(model: Model, part: str, marker: str, position: Array, q: Array) -> Array | None:
     """Return approximately the point (3,) m nearest to `position` that the marker can reach and that is outside the robot's body.
 
-    The body is all links that the part does not move. The motors other than those of the part stay as in q (n,) rad. Points at distances up
+    The body is all solid shapes that `body_at` tests. The motors other than those of the part stay as in q (n,) rad. Points at distances up
     to 0.5 m from `position`, in steps of 2 cm, are tried; None if none of them is suitable. All points are in the root frame.
     """
     where = np.asarray(position, dtype=np.float64)

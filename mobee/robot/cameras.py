@@ -22,12 +22,13 @@ GRAMMAR = "NAME, NAME=x,y,z or NAME=x,y,z,dx,dy,dz: a link or a marker, a place 
 
 
 def cameras_of(robot: Robot, asked: Sequence[str] = ()) -> dict[str, Camera]:
-    """Return the cameras that make pictures, by name; a name has only a-z, 0-9 and _, so that it is valid in a key of the bus.
+    """Return the cameras that make pictures, by name.
 
-    These are the first two cameras of the robot's file. If the file has none, but the markers left_eye and right_eye, they are the camera
-    "left" at left_eye and the camera "right" at right_eye. `asked`: further cameras: each text is the name of a camera of the file, or
-    describes a new camera on a marker or link, such as "palm=0,0,0.1" (`mobee.robot.cameras.camera_on`).  Raises InvalidValue or
-    UnknownName for a text that describes no camera.
+    A name has only a-z, 0-9 and _, so that it is valid in a key of the bus (the message system of the services). These are the first two
+    cameras of the robot's file. If the file has none, but the markers left_eye and right_eye, they are the camera "left" at left_eye and
+    the camera "right" at right_eye. `asked`: further cameras: each text is the name of a camera of the file, or describes a new camera on a
+    marker or link, such as "palm=0,0,0.1" (`mobee.robot.cameras.camera_on`).  Raises InvalidValue or UnknownName for a text that describes
+    no camera.
     """
     own = _named(robot.cameras.values()) or _eyes(robot)
     first = dict(list(own.items())[:OWN])
@@ -96,9 +97,10 @@ def _numbers(text: str, given: str) -> list[float]:
 
 
 def key_of(name: str, otherwise: str) -> str:
-    """Return a name with only the characters that keys of the bus and file names may have: a-z, 0-9 and _.
+    """Return a name with only the characters a-z, 0-9 and _, which are valid in keys of the bus and in file names.
 
-    Capitals become small letters, other characters become "_". `otherwise`: returned if no character remains.
+    The bus is the message system of the services. Capitals become small letters, each series of other characters becomes one "_", and "_"
+    at both ends is removed. `otherwise`: returned if no character remains.
     """
     return re.sub(r"[^a-z0-9_]+", "_", name.lower()).strip("_") or otherwise
 

@@ -84,8 +84,9 @@ def limit_zones(robot: Robot, width: Array) -> Array:
 def outside_zones(wanted: float, limits: Array, unit: float) -> float:
     """Return the position nearest to `wanted` that is in neither of the motor's two limit zones.
 
-    In a zone, a range beside a limit, the control law pushes the motor inward; its width is here that of the default gains. `wanted`,
-    `limits` (2,) and the result are in the motor's own unit, rad or m. `unit`: the motion of the motor that counts as 1 rad.
+    A zone is a range beside a limit, in which the control law pushes the motor inward. Here it has the width of the default gains: 10
+    degrees times `unit`, but at most 1/4 of the range. `wanted`, `limits` (2,) and the result are in the motor's own unit, rad or m.
+    `unit`: the motion of the motor that counts as 1 rad.
     """
     zone = min(LIMIT_WIDTH * unit, WIDEST * float(limits[1] - limits[0]))
     return float(np.clip(wanted, limits[0] + zone, limits[1] - zone))

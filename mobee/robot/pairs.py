@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The pairs of shapes that are tested for contacts, in one robot or in several robots that are joined into one.
 
-Solids and fields follow one rule; a pair is excluded if
+A solid is a volume of a link; a field is a larger volume around it, which causes a repulsive force. A pair of solids, or of fields, is
+excluded if
 - both shapes are on the same link, or their links are joined (below);
 - both are inside one subtree marked noSelfCollision (a hand: its fingers touch each other and the palm by design);
 - the file excludes it: <ignore first="link" second="link"/>;
@@ -115,7 +116,7 @@ def merged(*rules: Mapping[LinkPair, str]) -> dict[LinkPair, str]:
 
 
 def joined_pairs(bodies: Sequence[Robot], starts: Sequence[int], role: str) -> Ints:
-    """Return the tested pairs of shapes of one role ("solid" or "field") of several joined robots, (p, 2), sorted.
+    """Return the pairs of shapes of one role ("solid" or "field") that are tested for contacts in several joined robots, (p, 2), sorted.
 
     A field is a volume that causes a repulsive force. The pairs are those of each single robot, and all pairs of shapes of two different
     robots. A pair is left out if both shapes are on link 0, the base that the robots share. `bodies`: the robots, already with the link

@@ -8,12 +8,13 @@ both have the same parent.
 
 adjacency="published_2014" is the rule of the program (kailfrank/MoBeE, KinTreeNode::ignoreAdjacentPairs). A branch of the search first
 descends until it has passed two elements that have a solid: a link whose parent is a joint, and a joint whose parent is a link. From then
-on it ends before the first element with another tag than A. A, its siblings and elements directly below the root do not count for this.
+on it ends before the first element with another tag than A. Neither condition applies to A, its siblings and elements directly below the
+root: they are never one of the two elements, and the search never ends before them.
 
 adjacency="recorded_2014" is an earlier interpretation, with which this project recorded its results on icub_2014. A branch of the search
-ends after it has reached one link and one joint that have a shape of the role in question (solid or field); A itself does not count. By
-this rule no field of icub_2014 touches another field at home; by the rule of the program the forearm's field is 3 mm deep in the field of
-the thumb.
+ends after it has reached one link and one joint that have a solid, in the search for pairs of solids, or a field, in the search for pairs
+of fields; A itself does not count. By this rule no field of icub_2014 touches another field at home; by the rule of the program the
+forearm's field is 3 mm deep in the field of the thumb.
 """
 
 from __future__ import annotations
@@ -111,7 +112,8 @@ def neighbours(elements: Sequence[Element], bearing: Collection[int]) -> set[fro
     `bearing`: the elements that have a solid. For each element A, a search descends the tree from A and from each sibling of A; the
     elements that it reaches are neighbours of A. A branch of the search first descends until it has passed two elements that have a solid:
     a link whose parent is a joint, and a joint whose parent is a link. From then on it ends before the first element with another tag than
-    A. A, its siblings and elements directly below the root do not count for this.
+    A. Neither condition applies to A, its siblings and elements directly below the root: they are never one of the two elements, and the
+    search never ends before them.
     """
     children: dict[int, list[int]] = {}
     for index, element in enumerate(elements):
@@ -149,9 +151,9 @@ def _passed(
 def recorded_neighbours(elements: Sequence[Element], bearing: Collection[int]) -> set[frozenset[int]]:
     """Return the pairs of neighbours in the tree by the rule "recorded_2014", as indices of elements.
 
-    `bearing`: the elements that have a shape of the role in question (solid or field). For each element A, a search descends the tree from
-    A and from each sibling of A; the elements that it reaches are neighbours of A. A branch of the search ends after it has reached one
-    link and one joint that are in `bearing`; A itself does not count.
+    `bearing`: the elements that have a solid, for pairs of solids, or a field, for pairs of fields. For each element A, a search descends
+    the tree from A and from each sibling of A; the elements that it reaches are neighbours of A. A branch of the search ends after it has
+    reached one link and one joint that are in `bearing`; A itself does not count.
     """
     children: dict[int, list[int]] = {}
     for index, element in enumerate(elements):
@@ -178,7 +180,7 @@ def recorded_neighbours(elements: Sequence[Element], bearing: Collection[int]) -
 
 
 def near_root(parents: Sequence[int], tags: Sequence[str], index: int) -> bool:
-    """Return whether MoBeE of 2014 counted an element as the base (KinTreeNode::isNearRoot), so that it ignored contacts with the world.
+    """Return whether an element is near the root (KinTreeNode::isNearRoot): MoBeE of 2014 ignored its contacts with the world.
 
     Along the path from the element up to the root, the tag changes between link and joint. The element is near the root if the tag changes
     at most twice. A third change is allowed only at the last element of the path, whose parent is the root. `parents`: for each element the

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Actions and reaches in progress on an offline plant, and their outcomes."""
+"""Actions and reaches in progress on an offline plant (a robot simulated in one process), and their outcomes.
+
+An action sets the attractor of a part; in a reach a force pulls a marker to a target. Both end when the part has settled or timed out.
+"""
 
 from __future__ import annotations
 
@@ -27,9 +30,9 @@ _SETTLED = VERDICTS.index("settled")
 
 
 class Actions:
-    """The state of the present or last action of each part of a plant.
+    """The state of the present or last action of each part (group of motors) of a plant (simulated robot).
 
-    `parts`: a table with a row for each part (`mobee._core.plant.PART`), which the plant's ticks change.
+    `parts`: a table with a row for each part (`mobee._core.plant.PART`); the compiled core changes it in every tick of the plant.
 
     Args:
         robot: the robot.
@@ -55,7 +58,7 @@ class Actions:
     def require_possible(self, part: str, target: Array) -> None:
         """Check a target (n_part,) rad for a part: raise InvalidValue if no motor of the part is active, or if it is beyond the limits.
 
-        A target of another shape is not checked here.
+        The values of a target with a wrong shape are not checked; `Controller.set_attractor` refuses such a target.
         """
         if not self._alive[part]:
             raise InvalidValue(f"{part} cannot act: none of its motors is active in this plant; name it in active=[...]")
@@ -68,7 +71,7 @@ class Actions:
                 raise InvalidValue(f"target {at:.4g} rad for {motor}: must be within {low:.4g} to {high:.4g} rad")
 
     def begin(self, part: str, start: float, first_check: float) -> None:
-        """Start an action of a part at time `start` [s]; whether the part has settled is checked first `first_check` [s] later."""
+        """Start an action of a part at time `start` [s]; the first check whether the part has settled is `first_check` [s] later."""
         row = self._row[part]
         self._start[row], self._next_check[row], self._under_way[row] = start, start + first_check, 1
 
@@ -109,7 +112,10 @@ class Reach:
 
 
 class ReachesUnderWay:
-    """The reaches of all parts of an offline plant to the target that `present` has set."""
+    """The reaches in progress of all parts of an offline plant (simulated robot), and the outcomes of those that have ended.
+
+    In a reach, a force pulls a marker of the part to the target, which the method `present` sets; there is one target for all parts.
+    """
 
     def __init__(self, model: Model, controller: Controller) -> None:
         self._model, self._controller = model, controller
@@ -122,9 +128,9 @@ class ReachesUnderWay:
 
     @property
     def reaching(self) -> tuple[str, ...]:
-        """The names of the markers that a force pulls to the target at present, and of the marker `exempt`.
+        """The names of the markers that a force pulls to the target at present, and the attribute `exempt`, unless it is None.
 
-        The targets exert no repulsive force on the hands that carry these markers.
+        The targets exert no repulsive force on the hands that carry these markers. A force need not pull the marker `exempt`.
         """
         drawn = [reach.name for reach in self._under_way.values() if reach.end is None]
         return tuple(dict.fromkeys(drawn if self.exempt is None else [*drawn, self.exempt]))
@@ -196,9 +202,9 @@ class ReachesUnderWay:
         return self._ended[part]
 
     def after(self, part: str) -> Outcome | None:
-        """Return the outcome of the last motion of a part's reach that has ended; None if there is none, or if it was returned before.
+        """Return the outcome of the last motion of a reach of the part that has ended; each outcome is returned once, else None.
 
-        This motion is the return to the attractor, or the pull to the target if the part stays where it is.
+        The last motion is the return to the attractor, or the pull to the target if the part stays where it is.
         """
         return self._settled.pop(part, None)
 

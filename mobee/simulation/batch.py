@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs many offline plants at once: in one call of the compiled core, or in one process for each processor core."""
+"""Runs many offline plants (simulated robots) at once: in one call of the compiled core, or in one process for each processor core."""
 
 from __future__ import annotations
 
@@ -24,15 +24,16 @@ T = TypeVar("T")
 
 
 def advance_together(plants: Iterable[OfflinePlant], threads: int = 1) -> list[list[tuple[str, Outcome]]]:
-    """Call `advance()` of each plant; return the results (parts and outcomes) in the order of the plants.
+    """Run each plant (simulated robot) until an action of it has ended; return the list of (part, outcome) of each plant, in their order.
 
-    The results are bit-equal to separate calls, for any number of threads.
+    The results are bit-equal to those of separate calls of `OfflinePlant.advance`, for any number of threads.
 
     Raises:
-        InvalidValue: before any plant moves, for an object that is no OfflinePlant, a plant listed twice, a plant without an action in
-            progress, and plants that share a world while one of them reaches or has a callback (`every`).
+        InvalidValue: before any plant moves, for threads that are not valid, an object that is no OfflinePlant, a plant listed twice, a
+            plant without an action in progress, and plants that share a world while a reach is in progress on one of them, or a callback
+            is set (`OfflinePlant.every`).
         BatchInterrupted: a plant's state is not finite, or its callback raised an exception; the other plants finish, and the attribute
-            `results` of the exception holds their results.
+            `results` of the exception holds the result of each plant, or the exception that ended it.
     """
     listed = _apart(plants)
     for number, plant in enumerate(listed):
@@ -47,15 +48,15 @@ def advance_together(plants: Iterable[OfflinePlant], threads: int = 1) -> list[l
 
 
 def run_together(plants: Iterable[OfflinePlant], ticks: int, threads: int = 1) -> list[Trace]:
-    """Call `run(ticks)` of each plant; return the traces in the order of the plants.
+    """Run each plant (simulated robot) for a number of ticks; return their traces (records of each tick) in the order of the plants.
 
-    The results are bit-equal to separate calls, for any number of threads.
+    The results are bit-equal to those of separate calls of `OfflinePlant.run`, for any number of threads.
 
     Raises:
         InvalidValue: before any plant moves, for ticks or threads that are not valid, an object that is no OfflinePlant, a plant listed
-            twice, and plants that share a world while one of them reaches or has a callback (`every`).
+            twice, and plants that share a world while a reach is in progress on one of them, or a callback is set (`OfflinePlant.every`).
         BatchInterrupted: a plant's state is not finite, or its callback raised an exception; the other plants finish, and the attribute
-            `results` of the exception holds their traces.
+            `results` of the exception holds the trace of each plant, or the exception that ended it.
     """
     listed = _apart(plants)
     if isinstance(ticks, bool) or not isinstance(ticks, int) or ticks < 0:

@@ -26,7 +26,7 @@ PerMotor = float | Sequence[float]  # one number for all, or one for each motor 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotorParameters:
-    """Parameters of the simulated motors; with the defaults the simulation reproduces the published findings.
+    """Parameters of the simulated motors; with the defaults the simulation reproduces the findings of the thesis.
 
     lag, delay, backlash and friction are one number, or one for each motor in the order of `robot.motors`. If backlash or friction is one
     number, rotary motors have this value; for a sliding motor it is multiplied by a length [m] that is proportional to the motor's range

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The offline plant: model, controller and motors in one process, which runs the same ticks as the live system."""
+"""The offline plant: model, controller and motors in one process, with the same ticks as the live system (processes on a message bus)."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class PlantSettings(Settings):
 
     Args:
         gains: gains of the control law; None: `Gains.default()`.
-        motors: parameters of the motors; None: `MotorParameters()`, whose defaults reproduce the published findings.
+        motors: parameters of the motors; None: `MotorParameters()`, whose defaults reproduce the findings of the thesis and its papers.
         dt: s, the control tick.
         propagate: which motors a contact force acts on: "tree": those of the whole chain from the touching link to the base; "part": those
             of the touching part only.
@@ -53,7 +53,7 @@ class PlantSettings(Settings):
         active: names or patterns of parts and motors that move; None: all.  The others are rigid at home, without noise, and need no
             computing time.
         command_age: delay of the commands, in ticks: in tick k the motors move by the command that was computed from the encoders of tick
-            k - `command_age`; the live system has 1.
+            k - `command_age`; the live system (processes on a message bus) has 1.
         hashed: whether a hash of all encoder values is computed (`OfflinePlant.hash`).
         terms: further forces of the law, as Python functions, which are called in every tick.
     """
@@ -79,11 +79,12 @@ class PlantSettings(Settings):
 
 
 class OfflinePlant:
-    """A simulated robot under the control law in one process, without bus and real time; the seed determines all noise.
+    """A simulated robot under the control law, in one process, which does not run in real time; the seed determines all noise.
 
-    It is a Plant (`mobee.plant.Plant`) on which agents can act. A command computed from the encoders of tick k moves the motors from tick k
-    + 1 on, as in the live system. Several parts may act at once: `begin` starts an action, `advance` runs until at least one action has
-    ended, `act` does both for one part. Parts that are not acting are controlled too, and stay at their attractors.
+    It is a Plant (`mobee.plant.Plant`) on which agents can act. With the default `command_age`, a command computed from the encoders of
+    tick k moves the motors from tick k + 1 on, as in the live system (processes on a message bus). Several parts may act at once: `begin`
+    starts an action, `advance` runs until at least one action has ended, `act` does both for one part. Parts that are not acting are
+    controlled too, and stay at their attractors.
 
     Args:
         model: the robot in its world.
@@ -138,7 +139,8 @@ class OfflinePlant:
     def restart(self, seed: int, q: ArrayLike | None = None) -> None:
         """Start again at rest and at time 0; afterwards the plant behaves exactly like a new plant with this seed, but this call is faster.
 
-        Actions and reaches end without an outcome, and forces that were set are removed. The world and a presented target stay.
+        Actions and reaches end without an outcome, and forces that were set are removed. The world, a presented target and a callback of
+        `every` stay.
 
         Args:
             seed: seed of the encoders' noise, a whole number, at least 0.
@@ -186,7 +188,10 @@ class OfflinePlant:
 
     @property
     def pose(self) -> Pose | None:
-        """The pose of the model at the last tick, in the current world; None before the first tick."""
+        """The robot's pose at the encoder values of the last tick, with its contacts; None before the first tick.
+
+        The contacts are those in the world at the time when this property is first read after the tick.
+        """
         if self._pose is None and self._runner.ticks:
             self._pose = self.model.evaluate(self.q, reaching=self.reaching)
         return self._pose
@@ -237,8 +242,8 @@ class OfflinePlant:
     def act(self, part: str, target: Array, reaching: str | None = None) -> Outcome:
         """Set the part's attractor to `target` (n_part,) rad, run until the part has settled or timed out, and return the outcome.
 
-        `reaching`: name of a marker; during the action the targets exert no repulsive force on its hand, as in a reach. Raises InvalidValue
-        while another part is acting (then use `begin` and `advance`).
+        `reaching`: name of a marker; during the action, targets exert no repulsive force on the hand that carries it, as in a reach. Raises
+        InvalidValue while another part is acting (then use `begin` and `advance`).
         """
         self._require_alone(part, "act")
         self.begin(part, target)
@@ -249,7 +254,7 @@ class OfflinePlant:
             self._reaches.exempt = None
 
     def begin(self, part: str, target: Array) -> None:
-        """Start an action: set the part's attractor to `target` (n_part,) rad; the action ends when it has settled or timed out.
+        """Start an action: set the part's attractor to `target` (n_part,) rad; the action ends when the part has settled or timed out.
 
         A reach of the part that is in progress is cancelled. Raises InvalidValue for a target beyond the motors' limits.
         """
@@ -309,8 +314,9 @@ class OfflinePlant:
     def advance(self) -> list[tuple[str, Outcome]]:
         """Run until at least one acting part has ended; return the names and outcomes of the parts that ended, in the robot's order.
 
-        For a reach with `stay` False, the outcome is that of the return to the attractor; with `stay` True, that of the motion towards the
-        target. `reached` returns the outcome of the whole reach. Raises InvalidValue if no part is acting.
+        For a reach that was begun with `stay` False (see `begin_reach`), the outcome is that of the return to the attractor; with `stay`
+        True, that of the motion towards the target. `reached` returns the outcome of the whole reach. Raises InvalidValue if no part is
+        acting.
         """
         return finished(self.advancing())
 
@@ -331,7 +337,7 @@ class OfflinePlant:
         return [(part, self._reaches.after(part) or self._outcome(part)) for part in done]
 
     def tick(self) -> None:
-        """Run one control tick: read the encoders, compute model and controller, move the motors.
+        """Run one control tick: read the encoders, compute the contacts and the control law, and move the motors.
 
         The motors move by the command that was computed `command_age` ticks ago (`PlantSettings`). If an action ends in this tick, a later
         `advance` does not return its outcome.

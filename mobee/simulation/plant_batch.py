@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Several offline plants of one model, whose states are rows of arrays; one call of the core reads or runs all of them."""
+"""Several offline plants (simulated robots) of one model; their states are rows of arrays; one call of the core reads or runs them all."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from mobee.simulation.runner import Trace
 
 
 class PlantBatch:
-    """Several offline plants of one model; the results of each are bit-equal to those of a separate `OfflinePlant`.
+    """Several offline plants (simulated robots) of one model; the results of each are bit-equal to those of a separate `OfflinePlant`.
 
     In all methods, `which` (k,) are indices of `plants`, each at most once.
 
@@ -37,13 +37,20 @@ class PlantBatch:
         self._deepest = np.zeros((count, core.RECORD_DEPTHS))
 
     def state(self) -> Array:
-        """Return encoders [rad], attractors [rad] and controller velocities [rad/s] of all plants, in this order, (count, 3, n)."""
+        """Return encoders [rad], attractors [rad] and velocities [rad/s] of all plants, in this order, (count, 3, n).
+
+        An attractor is the position to which the controller moves a motor. The velocities are those of the control law's own state, which
+        are not measured.
+        """
         state = np.empty((len(self.plants), 3, len(self._model.robot.motors)))
         self._core.read_many(self._addresses.tobytes(), len(self.plants), address(state))
         return state
 
     def aim(self, which: Ints, attractors: Array) -> None:
-        """Set the attractors of the plants `which` (k,) to `attractors` (k, n) rad; no action begins."""
+        """Set the attractors of the plants `which` (k,) to `attractors` (k, n) rad, positions to which the controllers move the motors.
+
+        No action begins, and the limits of the motors are not checked.
+        """
         self._core.aim_many(self._addresses[which].tobytes(), len(which), np.ascontiguousarray(attractors).tobytes())
 
     def run(self, which: Ints, ticks: int) -> Array:

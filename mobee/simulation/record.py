@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The settings of an offline plant as plain JSON values, which are stored with the transitions learned on it."""
+"""The settings of a simulated robot (offline plant) as plain JSON values, which are stored with the transitions learned on it."""
 
 from __future__ import annotations
 

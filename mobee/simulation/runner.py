@@ -32,9 +32,10 @@ Work = Generator[int, None, T]
 
 
 def finished(work: Work[T]) -> T:
-    """Run the compiled core for each step that the generator `work` yields, until it ends; return the return value of the generator.
+    """Run a generator of a plant's work to its end, and the compiled core between its steps; return the return value of the generator.
 
-    Such generators come from `OfflinePlant.advancing` and `OfflinePlant.running`.
+    In each step, `work` yields the address of the structure whose ticks the core must run next (`Plant` of core/plant.cpp). Such generators
+    come from `OfflinePlant.advancing` and `OfflinePlant.running`.
     """
     run = core.calls().run
     try:
@@ -52,8 +53,8 @@ class Trace:
     """The record of a run, one row per tick.
 
     Attributes:
-        encoders: (ticks, n) rad.
-        q: (ticks, n) rad, positions of the joints.
+        encoders: (ticks, n) rad, measured at the beginning of the tick.
+        q: (ticks, n) rad, true positions of the motors at the end of the tick, on the output side of the backlash.
         velocity: (ticks, n) rad/s, the velocities in the controller's own state, which are computed and not measured.
         solid: (ticks,) m, depth of the deepest contact of solids at the pose of the encoders; 0 without contacts.
         field: (ticks,) m, depth of the deepest contact of fields, volumes that cause repulsive forces; 0 without contacts.
@@ -69,7 +70,7 @@ class Trace:
     def of(cls, record: Array) -> Trace:
         """Make a trace from the array (ticks, 3 n + 2) that the compiled core has written, a row per tick.
 
-        Columns: n encoders, n joint positions, n velocities, and the depths of the deepest contacts of solids and of fields.
+        Columns: n encoders, n true positions, n velocities, and the depths of the deepest contacts of solids and of fields, as in `Trace`.
         """
         n = (record.shape[1] - 2) // 3
         return cls(record[:, :n], record[:, n : 2 * n], record[:, 2 * n : 3 * n], record[:, 3 * n], record[:, 3 * n + 1])
@@ -84,9 +85,9 @@ class Runner:
     It holds the commands that the motors have not received yet, and the encoders and forces of the last tick.
 
     Args:
-        controller: of the robot.
-        motors: of the robot.
-        alive: (n,) whether each motor is active.
+        controller: the controller, which holds the control law and the attractor.
+        motors: the simulated motors.
+        alive: (n,) whether each motor is active; the others never move.
         dt: duration of a tick [s].
         command_age: delay of the commands, in ticks: in tick k the motors move by the command computed from the encoders of tick
             k - `command_age`.
@@ -139,9 +140,10 @@ class Runner:
     def prepare(self, most: int, kept: bool, solids: bool, reaching: tuple[str, ...] = ()) -> int:
         """Prepare the next run of up to `most` ticks; return the address of the structure that the core must run.
 
-        `kept`: whether encoders, joints and contacts of every tick are recorded, see `results`. `solids`: whether contacts of solids are
-        computed too; the record needs them, the forces do not. `reaching`: names of markers; the targets exert no repulsive force on the
-        hands that carry these markers.
+        The structure is `Plant` of core/plant.cpp. The run has at most one tick if Python computes forces for each pose. `kept`: whether
+        encoders, positions, velocities and contact depths of every tick are recorded, see `results`. `solids`: whether contacts of solids
+        are computed too; only the depths depend on them, the control does not. `reaching`: names of markers; the targets exert no
+        repulsive force on the hands that carry these markers.
         """
         controller, motors, struct = self._controller, self._motors, self._struct
         if self.batch_world is not None:
@@ -169,14 +171,14 @@ class Runner:
     def needs_python(self) -> bool:
         """Whether Python code is needed between ticks, so that `prepare` must be called before each run.
 
-        It is needed in torque mode, while a force given to `Controller.force` or `Controller.push` acts, while a reach is in progress, and
-        if the law has terms in Python.
+        It is needed in torque mode, while a force given to `Controller.force` or `Controller.push` acts, while a reach (a pull of a marker
+        to a target) is in progress, and if the control law has terms that are Python functions.
         """
         controller = self._controller
         return bool(controller.forced or controller.pushed or controller.reaches or controller.terms or controller.modality == "torque")
 
     def prepare_batch(self, deepest: Array) -> None:
-        """Prepare the structure for runs that `PlantBatch` starts in the core, and during which no Python code is needed.
+        """Prepare the core's structure (`Plant` of core/plant.cpp) for runs of `PlantBatch`, during which no Python code is needed.
 
         It stays prepared for any number of runs, until the world changes or `prepare` is called.
 

@@ -35,10 +35,11 @@ class SlidingObject:
     """An upright cylinder that the robot pushes over a horizontal surface.
 
     The motion is quasi-static: friction with the surface stops the object at once when nothing pushes it, and its contacts with the robot
-    have no friction. Such a disc moves along the normal of a contact, by the contact's depth, and does not rotate. It topples if it is
-    pushed higher than radius / friction above the surface, pressed from above, or wedged between solids; it falls if its centre leaves the
-    area. A fallen object is removed from the world for one second, and is then put back to its first place as soon as no part of the robot
-    is within 3 cm of this place. It exerts no force on the robot, and other objects do not stop it.
+    have no friction. Such an object moves in the horizontal direction of a contact's normal until the contact is resolved, and does not
+    rotate. It topples if it is pushed higher than radius / friction above the surface, pressed from above, or wedged between solids; it
+    falls if its centre leaves the area. A fallen object is removed from the world for one second, and is then put back to its first place
+    as soon as no solid of the robot is in this place, or within 3 cm of its side. It exerts no force on the robot, and other
+    objects do not stop it.
 
     Args:
         plant: the plant whose motion pushes the object; its callback (`every`) is used for this.
@@ -87,14 +88,14 @@ class SlidingObject:
     def perceive(self) -> dict[str, Array]:
         """Return the exact position of the object (3,) m, root frame, by its name; an empty dict after a fall, until it is put back.
 
-        Use it as the perception of a `PerceivingPlant`.
+        Give this method to a `PerceivingPlant` as the argument `perceive`.
         """
         return {} if self._place is None else {self.name: self._place.copy()}
 
     def put_back(self) -> bool:
         """Put the object to its first place, also if it has not fallen; return whether this was possible.
 
-        If the robot is within 3 cm of the place, nothing changes and False is returned.
+        If a solid of the robot is in this place, or within 3 cm of its side, nothing changes and False is returned.
         """
         if self._deepest(self._plant.motors.q.tobytes(), self._room) is not None:
             return False
@@ -112,7 +113,10 @@ class SlidingObject:
         return True
 
     def check(self, time: float) -> None:
-        """Push the object out of the robot's solids, or put it back if it has fallen; the plant calls this method with its time [s]."""
+        """Push the object out of the robot's solids; if it has fallen at least 1 s ago, try to put it back.
+
+        The plant calls this method with its `time` [s], about every 0.04 s.
+        """
         q = self._plant.motors.q.tobytes()
         if self._place is None:
             if time - self._fell_at >= ABSENCE:

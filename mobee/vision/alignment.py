@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Aligns a flat pattern with a picture to a few hundredths of a pixel: Lucas and Kanade's method, through the distortion of the lens."""
+"""Aligns a flat pattern with a picture to a few hundredths of a pixel: Lucas and Kanade's method, including the distortion of the lens."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Finds red balls in a picture: colour, then the cone of rays that touch a sphere."""
+"""Finds red balls in a picture: finds red regions, then fits to each outline the cone of rays that touch a sphere."""
 
 from __future__ import annotations
 

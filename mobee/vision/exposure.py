@@ -64,7 +64,10 @@ class Sensor:
         return View(rotation.T * UPWARDS, np.array([left, -top]), self._scale, self._width, self._height, position)
 
     def pixels(self, sample: int) -> Pixels:
-        """Return, for sample number `sample`, one pixel of its `view` for each of the height * width pixels of the picture, row by row."""
+        """Return which pixel of the sample's `view` each pixel of the picture shows: height * width pixels of the view, row by row.
+
+        The view has no distortion; the choice of its pixels distorts the picture as the lens does. `sample`: number of the sample, from 0.
+        """
         return self._pixels[sample]
 
     def develop(self, light: Floats, rng: np.random.Generator) -> Picture:
@@ -119,7 +122,7 @@ class Cameras:
         return self._sensor.develop(light, self._rng)
 
     def shares(self, name: str, postures: Sequence[Array], objects: int) -> Floats:
-        """Return the share (0 to 1) of each pixel that each of the world's first `objects` objects covers, (height, width, objects).
+        """Return which share of each pixel each object covers, 0 to 1, (height, width, objects), for the first `objects` of the world.
 
         `name` and `postures` are those of `expose`: the camera, and the positions of all motors (n,) rad at each of the `moments`.
         `objects`: number of objects.

@@ -32,11 +32,11 @@ class CameraSettings(Settings):
         height: rows of a picture.
         lens: lens of every camera.
         exposure: s, time during which a picture collects light: motion within it is blurred.
-        samples: number of times within the exposure at which the scene is drawn, each at another place within the pixels.
+        samples: number of renderings whose mean is the picture, each at another time of the exposure and another place within the pixels.
         gain: factor on the signal; the exposure is adapted such that the brightness is the same, so a gain of 2 collects half of the light.
         full_well: electrons of a white pixel at gain 1; their number has shot noise.
         read_noise: standard deviation of the readout, electrons.
-        latency: s from the middle of the exposure to the arrival of the picture, as the driver assumes it when it computes the stamp.
+        latency: s from the middle of the exposure to the arrival of the picture, as the driver assumes it for the time stamp.
         latency_error: s, bound of the difference of the true latency from the assumed one.
         jitter: standard deviation of the latency from picture to picture, s.
         mount_position: m, bound of the distance of a camera from its position in the model.
@@ -86,11 +86,11 @@ class CameraErrors:
     """By how much one robot's cameras differ from its kinematic model.
 
     Attributes:
-        mounts: by camera, (6,): displacement [m], then rotation vector [rad], both in the camera's own axes.  The true camera is that of
-            the model, displaced and then rotated.
+        mounts: dict from the name of a camera to (6,): displacement [m], then rotation vector [rad], both in the camera's own axes.  The
+            true camera is that of the model, displaced and then rotated.
         encoders: (n,) rad, true position minus encoder value; 0 for all motors except those of the head.
-        latency: s, true minus assumed latency: the true exposure was earlier than the stamp by this time.
-        tag: (6,), displacement and rotation vector of the tag, in the tag's axes.
+        latency: s, true minus assumed latency: the true exposure was earlier than the time stamp of the picture by this time.
+        tag: (6,), displacement [m] and rotation vector [rad] of the tag (an AprilTag on the palm, for calibration), in the tag's axes.
     """
 
     mounts: Mapping[str, Array]

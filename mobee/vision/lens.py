@@ -121,7 +121,7 @@ class Lens:
         return found
 
     def projection_slope(self, points: Array) -> Array:
-        """Return the derivative (..., 2, 3) [px/m] of `project` at points (..., 3) m."""
+        """Return the derivative (..., 2, 3) [px/m] of `project` at points (..., 3) m in the camera's frame, z > 0."""
         ahead = points[..., 2]
         flat = points[..., :2] / ahead[..., None]
         by_flat = self.distortion_slope(flat) * np.array([[self.fx], [self.fy]]) / ahead[..., None, None]

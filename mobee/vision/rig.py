@@ -22,9 +22,10 @@ AXES = ("x", "y", "z", "turn_x", "turn_y", "turn_z")  # of a mount
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rig:
-    """A robot with cameras, as the kinematic model has them; `names` is the order of the parameters that a calibration estimates.
+    """The cameras of a robot before calibration; `names` is the order of the parameters that a calibration estimates.
 
-    `cameras`: by name, with their poses in the model. `lens`: lens of all cameras. `tag`: on the palm; None: the robot has no tag.
+    `cameras`: by name, with their poses in the kinematic model of the robot. `lens`: lens of all cameras. `tag`: the tag on a palm; None:
+    the robot has no tag.
     """
 
     robot: Robot
@@ -40,7 +41,11 @@ class Rig:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The names of the P parameters: mounts of the cameras (6 each), offsets of encoders, latency, and the tag's mount (6)."""
+        """The names of the P parameters: mounts of the cameras (6 each), encoder offsets [rad], latency [s], and the tag's mount (6).
+
+        A mount is the displacement [m] and the rotation vector [rad] by which a camera or the tag differs from the model, in the axes of
+        its frame in the model.
+        """
         mounts = [f"{camera}.{axis}" for camera in self.cameras for axis in AXES]
         return (*mounts, *(f"encoder.{self.robot.motors[motor]}" for motor in self.head), "latency", *(f"tag.{axis}" for axis in AXES))
 
@@ -83,8 +88,8 @@ class Rig:
     def posture(self, x: Array, q: Array, dq: Array) -> Array:
         """Return the true posture (..., n) rad at the exposure of a picture, according to parameters x (P,).
 
-        `q` (..., n) rad and `dq` (..., n) rad/s: encoders and velocities at the stamp. The parameters correct the latency and the encoder
-        offsets.
+        `q` (..., n) rad and `dq` (..., n) rad/s: encoders and velocities at the time stamp of the picture. The parameters correct the
+        latency and the encoder offsets.
         """
         errors = self.errors(x)
         return q - errors.latency * dq + errors.encoders

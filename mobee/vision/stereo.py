@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The position of a point that two or more cameras see, with a covariance from the noise of pixels, encoders, stamp and calibration."""
+"""The position of a point that two or more cameras see, with a covariance from the noise of pixels, encoders, time and calibration."""
 
 from __future__ import annotations
 
@@ -58,8 +58,8 @@ def nearest_to_rays(origins: Array, rays: Array) -> Array:
 def rays_meet(rig: Rig, x: Array, moment: Moment, sighted: Mapping[str, Sighted]) -> Array | None:
     """Return the position (3,) m, root frame, that is nearest to the rays through given pixels of several cameras.
 
-    None if the rays are parallel, or if a pixel has no ray. `x`: (P,) the calibration's parameters. `moment`: encoders at the stamp.
-    `sighted`: the point in the pictures, by name of the camera.
+    None if the rays are parallel, or if a pixel has no ray. `x`: (P,) the calibration's parameters. `moment`: encoder values at the
+    time of the pictures. `sighted`: the point in the pictures, by name of the camera.
     """
     transforms = link_transforms(rig.robot, rig.posture(x, moment.q, moment.dq))
     frames = {name: camera_frames(rig.cameras[name], transforms, x[rig.where(name)]) for name in sighted}
@@ -76,17 +76,17 @@ def locate(
     uncertainty: Array | None = None,
     jitter: float = 0.0,
 ) -> Place | None:
-    """Return the position of a point from its pixels in two or more pictures with the same stamp, by least squares.
+    """Return the position of a point from its pixels in two or more pictures with the same time stamp, by least squares.
 
     None if the rays through the pixels are parallel or a pixel has no ray.
 
     Args:
         rig: the robot and its cameras.
         x: the calibration's parameters (P,).
-        moment: encoders at the stamp.
+        moment: encoder values at the time stamp.
         sighted: the point in the pictures, by name of the camera.
         uncertainty: covariance (P, P) of the parameters; None: they are exact.
-        jitter: standard deviation of the stamp, s.
+        jitter: standard deviation of the time stamp, s.
     """
     place = rays_meet(rig, x, moment, sighted)
     if place is None:

@@ -135,14 +135,14 @@ UNKNOWN = 0.5, 1.0  # without knowledge: probability that a transition reaches i
 
 
 class WorldChanges:
-    """Detects changes of the world from a learner's steps, and reports them to the learner's memory of failures.
+    """Detects changes of the world from a learner's steps, and reports them to the learner's memory of failed transitions.
 
     Args:
         make_detector: makes the detector, which decides when the world has changed.
         planning: gives the probabilities of the outcomes of transitions.
         predictor: gives the standard deviations of rewards. If it gives none, a reach is evidence for or against a change only if an
             earlier reach had the same state and target.
-        failures: the memory of failures; its method `change` is called with the number of transitions since the change.
+        failures: the memory of failed transitions; its method `change` is called with the number of transitions since the change.
     """
 
     def __init__(
@@ -189,16 +189,16 @@ class WorldChanges:
     def report(self) -> None:
         """Record that the world changes now; for a change that is known without the detector.
 
-        Transitions before this call are no longer evidence of what the world blocks for all targets. The predictor, if it can, compares
-        later rewards with earlier ones. The detector starts anew, because the outcomes before the change are no evidence about changes
-        after it.
+        From now on, the memory of failed transitions infers only from later transitions which of them the world blocks for all targets. A
+        predictor that can compare worlds (`WorldComparer`) treats later rewards as those of another world. A new detector is made, because
+        the outcomes before this change are no evidence about later changes.
         """
         self._failures.change(0)
         begin_world(self._predictor)
         self.restart()
 
     def restart(self) -> None:
-        """Replace the detector by a new one that knows no outcomes. The memory of failures does not change."""
+        """Replace the detector by a new one that has processed no outcome. The memory of failed transitions does not change."""
         self._detector = self._make_detector()
 
     def _variance(self, state: int, target: Array) -> float | None:

@@ -40,8 +40,9 @@ class Evaluation:
     """The results of an evaluation: arrays (R, P) for R repetitions of P problems (targets to reach).
 
     `rewards`: reward of the reach; 0 if no reach was made. `states`: state from which the reach started; -1 without a reach. `missing`: m,
-    remaining distance after the reach; NaN without a reach. `failures`: number of failed transitions. `actions`: number of transitions,
-    plus 1 if a reach was made. `duration`: s, by the plant's clock.
+    remaining distance after the reach; NaN without a reach. `failures`: number of failed transitions; a transition has failed if it leads
+    to a state with no higher value in the plan. `actions`: number of transitions, plus 1 if a reach was made. `duration`: s, by the plant's
+    clock.
     """
 
     rewards: Array
@@ -61,8 +62,9 @@ class Evaluation:
 def evaluate(agent: ReachAgent, problems: Sequence[ReachTarget], repetitions: int) -> Evaluation:
     """Let an agent attempt to reach every target (problem) once in each repetition, in random order; return the results.
 
-    A repetition starts from a random state; each further attempt starts where the previous one ended. The agent does not learn from this:
-    transitions are recorded in a copy of its memory of failures, which is discarded at the end of the repetition.
+    Before each repetition the part moves towards a random state, with at most `agent.limit` actions. Each further attempt starts in the
+    state in which the previous one ended. The agent does not learn from this: which transitions fail is recorded in a copy of
+    `agent.failures`, and the copy is discarded at the end of the repetition.
     """
     shape = repetitions, len(problems)
     found = Evaluation(

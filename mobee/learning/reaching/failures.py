@@ -30,9 +30,10 @@ MAX_CACHED = 256  # targets whose sums are in memory
 def midpoints(space: Space, reaches: Reaches) -> Array:
     """Return the midpoint of each transition, halfway between its start and its goal, shape (S A, 3 + d).
 
-    Row state * A + action belongs to this action of this state. Columns 0 to 2 are the marker's position in units of LENGTH_SCALE (0.08 m).
-    The last d columns are the positions of the joints; the unit of a joint is JOINT_SCALE (0.4) times the spread of its samples (largest
-    minus smallest). For an action that does not exist the goal is the start.
+    Row state * A + action belongs to this action of this state. Columns 0 to 2 are the position of the marker (the point of the hand that
+    reaches for targets) in units of LENGTH_SCALE (0.08 m), root frame. The last d columns are the positions of the joints; the unit of a
+    joint is JOINT_SCALE (0.4) times the spread of its samples (largest minus smallest). For an action that does not exist the goal is the
+    start.
     """
     goals = np.where(space.goals == NO_ACTION, np.arange(len(space))[:, None], space.goals)
     scaled = reaches.samples / np.maximum(np.ptp(reaches.samples, axis=0), 1e-9) / JOINT_SCALE
@@ -52,7 +53,7 @@ class AlikeFailures:
 
     Args:
         space: states and transitions.
-        reaches: the marker's position in each state.
+        reaches: position of the hand (of the marker that reaches for targets) in each state.
     """
 
     def __init__(self, space: Space, reaches: Reaches) -> None:
@@ -180,8 +181,8 @@ class FailuresSinceChange:
 
     Args:
         space: states and transitions.
-        reaches: the marker's position in each state.
-        usual: the memory of failures without changes of the world.
+        reaches: position of the hand (of the marker that reaches for targets) in each state.
+        usual: the memory to which all transitions are added, also those before a change.
     """
 
     def __init__(self, space: Space, reaches: Reaches, usual: Failures | AlikeFailures) -> None:
@@ -267,10 +268,11 @@ def by_target(touched: tuple[str, ...]) -> bool:
 
 
 def failures_of(space: Space, reaches: Reaches, kind: str) -> Failures | AlikeFailures:
-    """Make an empty memory of failures of a kind.
+    """Make an empty memory of failed transitions.
 
-    `kind`: "spread" or "local": a `Failures`, which learns about a transition from its tries with all targets, or with near targets;
-    "alike": an `AlikeFailures`, which learns from similar transitions too. Raises UnknownName if there is no such kind.
+    `reaches`: position of the hand in each state, and unit of distances. `kind`: "spread": a `Failures` that learns about a transition from
+    its tries with all targets; "local": a `Failures` that learns only from its tries with near targets; "alike": an `AlikeFailures`, which
+    learns from similar transitions too. Raises UnknownName if there is no such kind.
     """
     if kind not in FAILURES:
         raise UnknownName("kind of failures", kind, FAILURES)

@@ -67,8 +67,9 @@ class Histories:
     def average(self, target: Array, prior: float) -> Array:
         """Return for each action the weighted average of its values and of one value `prior`, shape (actions,).
 
-        The weight of a value is 1 / (1 + distance / scale), with the distance between its target and `target` (3,) m; the prior has
-        distance 0. A prior of 1 gives thesis eqs. 8.5 and 8.7; 0 gives eq. 8.1 with 1 added to the denominator.
+        The weight of a value is 1 / (1 + distance / `scale`), with the distance between its target and `target` (3,) m; a value with a
+        distance above `near` is ignored. The weight of `prior` is 1. A prior of 1 gives thesis eqs. 8.5 and 8.7; 0 gives eq. 8.1 with 1
+        added to the denominator.
         """
         totals, weights = sums = np.ones((2, self._actions))
         totals[:] = prior

@@ -37,8 +37,9 @@ class ReachSettings(Settings):
             "greedy" and "random" are those of the thesis), a class or function that makes a strategy, see `strategies.StrategyOf`, or the
             text `module:name` of such a function.
         failures: the targets for which plans avoid a transition after it has failed: "spread": all targets, but less for distant ones, as
-            published; "local": targets within 25 mm; "alike": its own target; and for all other targets, plans avoid it and similar ones,
-            if these failed more often than the average of all transitions.
+            published; "local": targets within 25 mm; "alike": the target with which it failed. With "alike", plans also avoid each
+            transition that was not tried with the present target, if similar transitions failed more often than the average of all
+            transitions.
         detector: detects changes of the world. After a change, failed transitions are avoided for all targets, see `FailuresSinceChange`. A
             name in `changes.DETECTORS`, a class or function that makes a detector, see `changes.DetectorOf`, or the text `module:name` of
             such a function.
@@ -201,8 +202,8 @@ class ReachLearner:
     def replay(self, targets: list[ReachTarget], steps: list[Step]) -> None:
         """Learn from recorded steps, in their order.
 
-        `targets`: the targets of all problems, in the order of the problems' numbers. `steps`: all recorded steps. The learner can
-        continue the last problem-try (attempt to reach a target) if it has not ended; so the plans of this one are computed too.
+        `targets`: the recorded targets; `Step.problem` is an index of this list. `steps`: all recorded steps. If the last problem-try
+        (attempt to reach a target) has not ended, its plans are computed again, so that the learner can continue it.
         """
         for target in targets:
             self.problems.index(target)

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plans that end in a reach: every state has one more action, the reach, after which the plan ends (thesis 8.2, 8.3.1)."""
+"""Plans that end in a reach, a motion in which a force pulls a marker to a target (thesis 8.2, 8.3.1).
+
+For these plans, every state has one more action, the reach, after which the plan ends.
+"""
 
 from __future__ import annotations
 
@@ -90,8 +93,8 @@ class ReachPlan:
 def plan_reach(space: Space, planning: ReachPlanning, expected: Array, failures: Array, start: int) -> ReachPlan:
     """Compute the path from the state `start`, and the reach at its end, that have the highest value.
 
-    `expected`: (S,) expected rewards of the reaches; replace negative values by 0. `failures`: (S, A) rewards of the transitions, below 0
-    for those that have failed. Raises InvalidValue if the space has no state `start`.
+    `expected`: (S,) expected reward of the reach from each state; the caller replaces negative values by 0. `failures`: (S, A) rewards of
+    the transitions, below 0 for those that have failed. Raises InvalidValue if the space has no state `start`.
     """
     space.actions(start)
     path, actions, probabilities = _best_path(planning, start, *planning.values(expected, failures))

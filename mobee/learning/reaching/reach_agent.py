@@ -51,7 +51,7 @@ class ReachAgent(ReachLearner):
     Raises:
         UnknownName: no such setting, predictor, strategy, value of the setting `failures`, detector, or marker.
         InvalidValue: a plant of another robot, an `ObjectSpace`, or a value out of range.
-        MobeeError: the store holds reaches of another space, marker or scale.
+        MobeeError: the store holds reaches of another space or marker, or with another `scale` (unit of distances, `ReachSettings`).
     """
 
     @accepts(ReachSettings)
@@ -87,17 +87,19 @@ class ReachAgent(ReachLearner):
     def state(self) -> int:
         """The present state of the part, from the last outcome.
 
-        At the start, and after an interruption or an evaluation, the state is not known: then the plant measures it when it is read.
+        At the start, and after an interruption or an evaluation, the state is not known; reading this property then lets the plant measure
+        it.
         """
         if self._state is None:
             self._state = self.space.state_of(self.plant.measure(self.part))
         return self._state
 
     def try_problem(self, target: ReachTarget) -> Try:
-        """Make one problem-try and return it: move to the state that the plan chose, then reach for the target (thesis 8.3.1).
+        """Make one problem-try (attempt to reach one target) and return it: move to a state by a plan, then reach (thesis 8.3.1).
 
         The agent presents the target to the plant, plans again after failed transitions, and learns from every step. Raises
-        ActionInterrupted if the plant does; the problem-try then stays under way, and the next call for the same position continues it.
+        ActionInterrupted if the plant does; the problem-try then stays under way, and the next call for a target at the same position
+        continues it.
         """
         self.begin(target)
         self.plant.present(target)
@@ -125,9 +127,10 @@ class ReachAgent(ReachLearner):
 
         A problem-try is one attempt to reach one target. After the robot has perceived a change of the world, such as a new object,
         practice reduces the number of tries on the robot. If the agent has a detector of changes, it assumes that the world changed just
-        before the first of these tries. The predictor "gp" estimates how similar the rewards on both plants are, and those before the
-        change; the less similar, the less they count on the robot. A problem-try under way is ended first. The attributes `tries` and
-        `steps` include the tries and actions on both plants. `plant`: moves the space's robot. `problems`, `tries`: as in `learn`.
+        before the first of these tries. The predictor "gp" estimates how similar the robot's later rewards are to those on the other plant
+        and to those before the change. Less similar rewards have less influence on its predictions. A problem-try under way is ended first.
+        The attributes `tries` and `steps` include the tries and actions on both plants. `plant`: moves the space's robot. `problems`,
+        `tries`: as in `learn`.
 
         Raises InvalidValue for a plant of another robot, or if the agent has a store, which holds what happened to one robot only.
         """

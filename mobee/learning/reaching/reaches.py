@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The reach actions of a space: the marker's position and Jacobian in each state, from which its reach begins."""
+"""The reaches of a space, one from each state: the marker's position and Jacobian at the pose in which the reach begins.
+
+A reach is an action that pulls a marker from the pose of a state to a target; it is the last action of a plan.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,7 @@ SCALE = 0.01  # m, unit of distances in the published equations; the thesis leav
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Reaches:
-    """The reach actions of a space, one for each state.
+    """The reaches of a space, one for each state; a reach is an action that pulls a marker from the pose of the state to a target.
 
     `samples`: (S, d) rad, poses of the joints at which the reaches begin. `hands`: (S, 3) m, root frame, position of the marker in each of
     them. `scale`: unit of distances in thesis eqs. 8.1, 8.4, 8.5 and 8.7, m. `jacobians`: (S, 3, d) m/rad, derivative of the marker's

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rebuilds a reach agent from the file of a run."""
+"""Rebuilds a reach agent (an agent that has learned to reach targets) from the SQLite file of the run in which it learned."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from mobee.store import TransitionStore
 def load_reaches(
     file: str | Path, plant: ReachPlant, part: str | None = None, hands: Array | None = None, jacobians: Array | None = None
 ) -> ReachAgent:
-    """Rebuild a reach agent from the file of a run, to use what it learned: its strategy is "greedy", and it stores nothing.
+    """Rebuild a reach agent, which has learned to reach targets, from the file of a run. Its strategy is "greedy", and it stores nothing.
 
-    It plans with the outcomes of the part's transitions in the same file. If the file has none for this space, the agent assumes at first
-    that every action most probably ends in its goal.
+    It plans with the outcomes of the part's transitions that are stored in the same file. If the file has none for the agent's space
+    (states and actions), the agent assumes at first that every action most probably ends in its goal.
 
     Args:
-        file: the file of the run.
+        file: the SQLite file of the run in which the agent learned.
         plant: the robot on which the agent acts.
         part: the agent's part; None is valid if the file contains the reaches of one part.
         hands: (S, 3) m, root frame, position of the marker in each state; None: computed by kinematics.

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stores the steps of a reach learner in the file of a run; each step is on disk before the next action."""
+"""Stores the steps of a reach learner in the SQLite file of a run (of one or several agents); each is on disk before the next action.
+
+A step is one action of the learner: a transition between states, or a reach, in which a force pulls a marker to a target.
+"""
 
 from __future__ import annotations
 
@@ -34,12 +37,12 @@ COLUMNS = tuple(column.name for column in fields(Step))
 
 
 class ReachStore(AgentFile):
-    """The problems and steps of the reach learner of one part, in the file of a run.
+    """The problems (targets to reach) and steps (actions with their outcomes) of the reach learner of one part, in the file of a run.
 
     Args:
         path: the SQLite file; made if missing.
         part: the learner's part; its reaches are stored under the name "<part> reaching", beside the part's transitions.
-        read_only: open the file for reading only; raises MobeeError if it has no reaches.
+        read_only: open the file for reading only; raises MobeeError if no reach learner has used the file.
     """
 
     def __init__(self, path: str | Path, part: str, read_only: bool = False) -> None:
@@ -70,15 +73,15 @@ class ReachStore(AgentFile):
                 self._db.execute("INSERT OR REPLACE INTO reach_learners VALUES (?, ?, ?)", (self.agent, self._last, given))
 
     def learners(self) -> list[tuple[int, dict[str, Any]]]:
-        """Return the recorded settings in order, each as (number of steps that were recorded before, settings)."""
+        """Return the settings of the learner that were recorded, oldest first, each as (number of steps recorded before them, settings)."""
         with explained(self.path):
             rows = self._db.execute("SELECT n, settings FROM reach_learners WHERE agent = ? ORDER BY n", (self.agent,)).fetchall()
         return [(n, json_of(self.path, f"the settings of {self.agent}", settings)) for n, settings in rows]
 
     def append(self, step: Step, problems: Sequence[ReachTarget]) -> None:
-        """Write one step, and the targets of problems that are new; all is on disk when this returns.
+        """Write one step (action of the learner), and the targets of problems that are new; all is on disk when this returns.
 
-        `problems`: the targets of all problems so far. Raises MobeeError if the number of the step is not the next one.
+        `problems`: the targets of all problems so far, by number. Raises MobeeError if the number of the step is not the next one.
         """
         if step.n != self._last + 1:
             raise MobeeError(f"{self.path}: {self.agent} has {self._last} steps: append number {self._last + 1}, not {step.n}.")
@@ -90,19 +93,19 @@ class ReachStore(AgentFile):
         self._last, self._problems = step.n, self._problems + len(new)
 
     def times(self) -> list[float]:
-        """Return the time at which each step was written, in order, in s since 1970."""
+        """Return the time at which each step (action of the learner) was written, in order, in s since 1970."""
         with explained(self.path):
             rows = self._db.execute("SELECT t FROM reach_steps WHERE agent = ? ORDER BY n", (self.agent,)).fetchall()
         return [t for (t,) in rows]
 
     def problems(self) -> list[ReachTarget]:
-        """Return the target of each problem, in the order of the problems' numbers."""
+        """Return the target of each problem (task to reach a target), in the order of the problems' numbers."""
         with explained(self.path):
             rows = self._db.execute("SELECT target FROM reach_problems WHERE agent = ? ORDER BY problem", (self.agent,)).fetchall()
         return [self._problem(target) for (target,) in rows]
 
     def load(self) -> list[Step]:
-        """Return all steps, in order; raises MobeeError if a step is missing or damaged."""
+        """Return all steps (actions of the learner), in order; raises MobeeError if a step is missing or damaged."""
         with explained(self.path):
             rows = self._db.execute(f"SELECT {', '.join(COLUMNS)} FROM reach_steps WHERE agent = ? ORDER BY n", (self.agent,)).fetchall()
         for expected, row in enumerate(rows, start=1):
@@ -131,7 +134,7 @@ class ReachStore(AgentFile):
 
 
 def reaching_parts(file: str | Path) -> tuple[str, ...]:
-    """Return the names of the parts that have reaches in the file of a run."""
+    """Return the names of the parts for which a reach learner has stored steps in `file`, the SQLite file of a run."""
     path = Path(file)
     with explained(path), closing(opened(path, read_only=True)) as database:
         if not _has_reaches(database):

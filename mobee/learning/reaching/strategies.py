@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Strategies of a reach learner: each computes the rewards of the reach actions that its plans use while it learns (thesis 8.3.2).
+"""Strategies for learning to reach: each computes the rewards that reaches have in the learner's plans while it learns (thesis 8.3.2).
 
-They are: random, greedy, intrinsic (prediction errors), upper bounds, random samples (Thompson sampling) and learning progress.
+A reach is an action that pulls a marker from the pose of a state to a target; it is the last action of a plan. The strategies are: random,
+greedy, intrinsic (prediction errors), upper bounds, random samples (Thompson sampling) and learning progress.
 """
 
 from __future__ import annotations
@@ -22,11 +23,11 @@ RANDOM_SHARE = 0.2  # of the problem-tries, which reach from a random state
 
 
 class Progress:
-    """A strategy for learning progress: the reward of a reach in plans is how much the observed rewards from its state have changed.
+    """A strategy for learning progress: the planned reward of a reach is how much the observed rewards from its state have changed.
 
-    Of the last eight rewards observed from a state, the mean of the newer half is compared with that of the older half; with fewer than two
-    observed rewards the reward in plans is 1. In one of five problem-tries (attempts to reach one target) it is 1 for a random state and 0
-    for all others.
+    The planned reward is the reward that the learner's plans use. It is the absolute difference between the mean of the newer half and that
+    of the older half of the last eight rewards observed from the state, or 1 with fewer than two observed rewards. In one of five
+    problem-tries (attempts to reach one target), the planned reward is 1 for a random state and 0 for all others.
     """
 
     def __init__(self, reaches: Reaches, predictor: RewardPredictor) -> None:
@@ -34,7 +35,7 @@ class Progress:
         self._interest: Array = np.ones(len(reaches))
 
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:
-        """Record the reward of a reach that began in `state`. `target` and `expected` are not used."""
+        """Record the observed `reward` of a reach that began in `state`. `target` and `expected` are not used."""
         lately = self._lately[state]
         lately.append(reward)
         if len(lately) > 1:
@@ -58,10 +59,11 @@ OPTIMISM = 2.0  # standard deviations that `ucb` adds to the expected reward
 
 
 class Strategy(Protocol):
-    """The interface of strategies: computes the rewards that the reach actions have in a learner's plans while it learns.
+    """The interface of strategies: a strategy computes the rewards that reaches have in a learner's plans while it learns.
 
-    These rewards decide what the learner tries; they need not be the rewards that it will observe. They must depend only on the reaches
-    that were added and on the random generator; the method `rewards` must change nothing.
+    A reach pulls a marker from the pose of a state to a target. The rewards decide what the learner tries; they need not be the rewards
+    that it will observe. They must depend only on the reaches that were added and on the random generator; the method `rewards` must change
+    nothing.
     """
 
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:
@@ -118,8 +120,8 @@ class Greedy:
 class Intrinsic:
     """A strategy: the reward of a reach is the prediction error to expect (thesis eqs. 8.6 and 8.7).
 
-    An error is the expected minus the observed reward. The error to expect is the average of earlier errors in reaches from the same state,
-    with more weight for nearer targets, and of one imagined error of 1.
+    An error is the expected minus the observed reward. The error to expect is a weighted average over earlier reaches from the same state;
+    errors with nearer targets have larger weights. One imagined error of 1 is included in the average, with the weight of distance 0.
     """
 
     def __init__(self, reaches: Reaches, predictor: RewardPredictor) -> None:

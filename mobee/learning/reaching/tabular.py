@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A plant with reaches that is given by tables, for tests and for worlds with known ground truth."""
+"""A plant given by tables that can also reach (move its marker to a target), for tests and for worlds with known ground truth."""
 
 from __future__ import annotations
 
@@ -84,10 +84,10 @@ class ReachTable(TabularPlant):
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
         """Reach for the target that was given to `present`, from the present state; the part stays in this state.
 
-        The remaining distance in the outcome is the mean distance that the function `world` gives for target and state, plus noise (the
-        absolute value of this sum). The position of the marker in the outcome is always (0, 0, 0), and its duration 2 s. `part`: the part
-        of the space. `marker`: name of the marker, only for the error message. `stay`: not used. Raises InvalidValue if no target is
-        presented, and UnknownName for another part.
+        The remaining distance in the outcome is |d + e|: d is the mean distance that the function `world` gives for target and state, and e
+        is normal noise. The position of the marker in the outcome is always (0, 0, 0), and its duration 2 s. `part`: the part of the space.
+        `marker`: name of the marker, only for the error message. `stay`: not used. Raises InvalidValue if no target is presented, and
+        UnknownName for another part.
         """
         if self._presented is None:
             raise InvalidValue(f"nothing to reach for with the {marker}: present a target first.")

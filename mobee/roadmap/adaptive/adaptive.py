@@ -109,8 +109,8 @@ class AdaptiveRoadmap:
     def costs(self, goals: ArrayLike) -> Array:
         """Return the cost of the cheapest path from each vertex to one of the vertices `goals`, shape (S,).
 
-        The cost of an edge is its length [rad] divided by its probability of success. It is infinite for a vertex from which no path is
-        left.
+        The cost of an edge is its length [rad] divided by its probability of success. The cost of a vertex from which no path is left is
+        infinite.
         """
         from scipy.sparse import csr_array
         from scipy.sparse.csgraph import dijkstra

@@ -107,7 +107,7 @@ class MapRecord:
     def observe(self, state: int, action: int, arrived: int, outcome: Outcome) -> None:
         """Learn and record the outcome of a motion along the edge `action` of vertex `state`.
 
-        `arrived`: the vertex where the motion ended. `outcome`: what the plant returned for the action.
+        `arrived`: the goal of the edge if the motion ended there, else `state`. `outcome`: what the plant returned for the action.
         """
         made = Transition(
             n=self.transitions + 1,
@@ -128,8 +128,8 @@ class MapRecord:
         """Change the roadmap and record the change; return the result of the method.
 
         `what`: name of the method of AdaptiveRoadmap, "grow", "join" or "prune". `given`: its arguments, plain JSON values. Raises
-        UnknownName for another method. A change that the roadmap refuses is not recorded. If the store cannot be written, the roadmap has
-        changed already: make roadmap and record again from the store.
+        UnknownName for another method. A change that the roadmap refuses is not recorded. If the store cannot be written, MobeeError is
+        raised after the roadmap has changed; then create roadmap and record again from the store.
         """
         if what not in CHANGES:
             raise UnknownName("change of a map", what, CHANGES)

@@ -37,8 +37,8 @@ class Walker:
     """Moves one part of a robot along the edges of an adaptive roadmap.
 
     To move along an edge, the walker commands the part to the pose of the edge's goal. The edge succeeds if the part comes to rest within
-    `near` of the goal. Otherwise the map records the failure, the part moves back to the start of the edge (in thesis 4.1, the reflex does
-    this), and the walker plans a new path.
+    `near` of the goal. Otherwise the map records the failure, the part moves back to the start of the edge (in thesis 4.1 by the reflex,
+    which retraces the recent poses after a contact), and the walker plans a new path.
 
     Args:
         roadmap: the map, which the walker changes.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Builds task-relevant roadmaps: poses that satisfy some costs, spread over a task space, and edges between them (thesis 3.3)."""
+"""Builds task-relevant roadmaps: poses within the tolerances of given costs, spread over a task space, and edges (thesis 3.3)."""
 
 from __future__ import annotations
 

@@ -85,7 +85,8 @@ class Progress:
 class Builder(Protocol):
     """The interface of a builder, which finds the vertices of a roadmap step by step.
 
-    Steps are deterministic: they depend only on the builder's state, the state of its generator `rng`, and `problem.evaluations`.
+    `problem`: the costs of a pose, and the motors that may move; `problem.evaluations` is the number of evaluated poses. Steps are
+    deterministic: they depend only on the builder's state, the state of its generator `rng`, and `problem.evaluations`.
     """
 
     rng: np.random.Generator

@@ -178,7 +178,7 @@ class Frontier:
         return found
 
     def nearest(self, point: Array, count: int) -> tuple[Ints, Array]:
-        """Return up to `count` vertices nearest to a point (m,), nearest first, and their distances in spacings (Algorithm 2)."""
+        """Return up to `count` vertices nearest to a point (m,), nearest first, and their distances in spacings (thesis Algorithm 2)."""
         squares = ((self.points - point) ** 2).sum(axis=1)
         some = np.argpartition(squares, count - 1)[:count] if count < len(squares) else np.arange(len(squares))
         order = some[np.lexsort((some, squares[some]))]
@@ -203,8 +203,8 @@ class Frontier:
         """Add a vertex at a point (m,), and its edges to the m nearest vertices.
 
         Also adds the simplex whose m + 1 corners are the new vertex and these m vertices to the region. Returns the inverse (m, m) of the
-        matrix whose columns are the simplex's edges from the new vertex; None if there are fewer than m
-        other vertices, or if the simplex is flat.
+        matrix whose columns are the simplex's edges from the new vertex; None if there are fewer than m other vertices, or if the simplex
+        is nearly flat (then it is not added).
         """
         number, n = len(self), self.dimensions
         corners, _ = self.nearest(point, n)

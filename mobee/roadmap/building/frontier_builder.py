@@ -45,7 +45,8 @@ class EvaluatedPoses:
 class PoseEvaluator:
     """Evaluates the cost, validity and task coordinates of poses.
 
-    `spacing`: (m,) distance between vertices in each task coordinate. `pool`: executor whose threads share the work; None: one thread.
+    `problem`: has the robot's model and the terms of the cost. `task`: the task space and its box. `spacing`: (m,) distance between
+    vertices in each task coordinate. `pool`: executor whose threads share the work; None: one thread.
     """
 
     def __init__(self, problem: Problem, task: Task, spacing: Array, pool: Executor | None = None) -> None:
@@ -66,7 +67,7 @@ class PoseEvaluator:
         return EvaluatedPoses(*(np.concatenate(column) for column in zip(*((one.cost, one.valid, one.point) for one in done), strict=True)))
 
     def violations(self, q: Array) -> str:
-        """Return a text that lists the terms and task coordinates that a pose (n,) rad violates, with the amounts."""
+        """Return a text that lists the terms not within their tolerances, and the task coordinates outside the box, in a pose (n,) rad."""
         pose = self.problem.model.evaluate(q[None])
         found = [
             f"{name} by {float(term.residual(pose)[0]):.3g} (tolerance {term.tolerance:.3g})"
@@ -159,10 +160,10 @@ class FrontierBuilder:
             self._add(posture, point)
 
     def step(self) -> bool:
-        """Compute a generation of all searches and add the vertices found; return False if no further search can start.
+        """Compute one generation of each running search and add the vertices found; return False if no search runs and none can start.
 
         Raises:
-            MobeeError: no first pose was found.
+            MobeeError: all searches for the first vertex have ended, and none has found a valid pose.
         """
         self.scheduler.refill()
         which = np.flatnonzero(self.scheduler.vertex != IDLE)
@@ -189,7 +190,10 @@ class FrontierBuilder:
         return True
 
     def state(self) -> dict[str, NDArray[Any]]:
-        """Return the state, except that of `rng`, as arrays by name; "q" and "y" are the poses and task coordinates of the vertices."""
+        """Return the state of the builder without that of `rng`, as arrays by name, for `restore`.
+
+        "q" and "y" are the poses (V, n) rad and the task coordinates (V, m) of the vertices.
+        """
         q, y = self.result()
         known = {"q": q, "y": y, "postures": self._postures.rows, "places": self.frontier.points, "weights": self.frontier.weights}
         return self.scheduler.state() | known | {"best": self._best, "best_cost": np.array(self._best_cost)}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Builds a roadmap by least squares: solves for the points of a lattice in the task space, outward from the first pose."""
+"""Builds a roadmap: finds poses for the points of a lattice in the task space by least squares, outward from a first pose."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class Lattice:
         return self._shifted(points, self._halves, lattice_only=False)
 
     def too_close(self, point: Point) -> list[Point]:
-        """Return the lattice and intermediate points nearer than MIN_DISTANCE (0.8 spacings) to a point, also those outside the box.
+        """Return the other lattice and intermediate points nearer than MIN_DISTANCE (0.8 spacings) to a point, also those outside the box.
 
         Each point is a tuple p of m whole numbers: the middle of the box plus the sum of p[i] / 2 times basis vector i of the lattice.
         """
@@ -243,7 +243,7 @@ def lattice_poses(
     no first pose is found.
 
     Args:
-        problem: the terms, and the motors that may move.
+        problem: the terms of the cost of a pose, and the motors that may move.
         task: the task coordinates and their box.
         spacing: (m,) distance between lattice points in each task coordinate.
         rng: draws all random numbers.
@@ -263,8 +263,9 @@ def lattice_poses(
 class LatticeBuilder:
     """Finds a pose for every reachable point of a lattice in the task space, step by step, outward from the first pose.
 
-    `spacing`: (m,) distance between lattice points in each task coordinate. `rng`: draws all random numbers. `patience`: limits of the work
-    on points that are hard to reach. Raises InvalidValue if a task coordinate has no derivative.
+    `problem`: the terms of the cost of a pose, and the motors that may move. `task`: the task coordinates and their box. `spacing`: (m,)
+    distance between lattice points in each task coordinate. `rng`: draws all random numbers. `patience`: limits of the work on points that
+    are hard to reach. Raises InvalidValue if a task coordinate has no derivative.
     """
 
     def __init__(self, problem: Problem, task: Task, spacing: Array, rng: np.random.Generator, patience: Patience = _DEFAULT) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Schedules the evolution-strategy searches of a growing roadmap: start vertex, aim, time-out (thesis Algorithm 4)."""
+"""Schedules the searches by evolution strategy for new vertices of a roadmap: their start, aim and time limit (thesis Algorithm 4)."""
 
 from __future__ import annotations
 
@@ -31,13 +31,14 @@ IDLE, FIRST = -1, -2  # in place of a start vertex
 class SearchScheduler:
     """Starts and ends searches for new vertices of a roadmap, up to L = `settings.searches` at the same time (thesis Algorithm 4).
 
-    The attributes are arrays with one row for each search. `vertex` (L,): the start vertex; IDLE (-1) where no search runs, FIRST (-2) for
-    a search for the first pose. `aim` (L, m): the point at which the search aims, in spacings; NaN without an aim. `near` (L, K, m): the
-    points of the K vertices nearest to the aim, or without an aim to the start vertex; infinite where there are fewer. K is 16, 48 or 96
-    for m = 1, 2 or 3, else 192.
+    All points are in the task space (dimension m), in spacings: 1 is the distance that neighbouring vertices should have. The attributes
+    are arrays with one row for each search. `vertex` (L,): the start vertex; IDLE (-1) where no search runs, FIRST (-2) for a search for
+    the first pose. `aim` (L, m): the point at which the search aims; NaN without an aim. `near` (L, K, m): the points of the K vertices
+    nearest to the aim, or without an aim to the start vertex; infinite where there are fewer. K is 16, 48 or 96 for m = 1, 2 or 3, else
+    192.
 
     Args:
-        frontier: the vertices in the task space.
+        frontier: the vertices found so far, as points in the task space, with their expansion weights (searches start at large ones first).
         postures: (V, d) positions of the motors that may move, at the vertices, in fractions of their ranges.
         start: (d,) posture at which the search for the first pose begins, in fractions of the ranges.
         settings: settings of the searches.
@@ -73,7 +74,8 @@ class SearchScheduler:
     def expandable(self) -> Flags:
         """Return whether a search may start from each vertex, (V,): its expansion weight must be above 0.
 
-        With the setting `frontier` (the default) it must also have a free direction, as `Frontier` defines it.
+        The weight is 1 at first and is lowered by each failed search that started there. With the setting `frontier` (the default) the
+        vertex must also have a free direction: one in which the point one spacing away is not explored yet, as `Frontier` defines it.
         """
         able: Flags = self._frontier.weights > 0.0
         return able & self._frontier.free.any(axis=1) if self._settings.frontier else able
@@ -81,7 +83,8 @@ class SearchScheduler:
     def refill(self) -> None:
         """Start new searches until `settings.searches` are running, or no vertex is left from which a search may start.
 
-        Vertices with larger expansion weights come first; among vertices with equal weights, the one that was found first.
+        Vertices with larger expansion weights (1 at first, lowered by each failed search) come first; among equal weights, the vertex that
+        was found first. As long as there is no vertex, the searches are those for the first pose, at most 4 at the same time.
         """
         room = np.flatnonzero(self.vertex == IDLE).tolist()
         if not len(self._frontier):
@@ -101,10 +104,11 @@ class SearchScheduler:
                 busy.append(self._centre(room.pop(0)))
 
     def end_successful(self, number: int, point: Array, simplex: Array | None) -> None:
-        """End the search `number`, which has found a vertex, and all searches whose aims the new vertex makes useless.
+        """End the search `number`, which has found a vertex, and all other searches that are of no use now; these do not count as failed.
 
-        An aim is useless if it is nearer than 0.8 spacings to the new vertex or inside its simplex; such a search does not count as failed.
-        `point`: (m,) of the new vertex, in spacings. `simplex`: (m, m) as `Frontier.add` returns it for this vertex, or None.
+        These are all searches for the first pose, and with the setting `frontier` those whose aim is nearer than 0.8 spacings to the new
+        vertex, or inside the simplex that this vertex forms with its m nearest vertices. `point`: (m,) of the new vertex, in spacings.
+        `simplex`: (m, m), this simplex as `Frontier.add` returns it (inverse of the matrix of its edges), or None.
         """
         if self.vertex[number] >= 0:
             self._ages.append(self.searches.age[number])
@@ -121,7 +125,7 @@ class SearchScheduler:
         self._note_vertex(active, point)
 
     def end_failed(self) -> None:
-        """End the searches that ran too long or whose distribution is too narrow, and lower the weights of their start vertices."""
+        """End the searches that ran too long or whose distribution is too narrow; lower the expansion weights of their start vertices."""
         over = (self.vertex != IDLE) & ((self.searches.age >= self._patience) | (self.searches.sigma < STALLED_STD))
         for number in np.flatnonzero(over & (self.vertex >= 0)):
             self._frontier.weights[self.vertex[number]] -= self._settings.delta
@@ -218,7 +222,8 @@ def predicted_posture(frontier: Frontier, postures: Array, vertex: int, aim: Arr
     """Return the predicted posture (d,) for a point `aim` (m,), by a linear fit to the postures of vertices near `vertex`.
 
     The fit uses only vertices within 2.5 spacings whose postures differ from that of `vertex` by less than 0.2 in every motor.
-    Postures (V, d) and the result are in fractions of the motors' ranges, 0 to 1; `aim` is in spacings.
+    Postures (V, d) and the result are in fractions of the motors' ranges, 0 to 1; `aim` is in the task space, in spacings (1 is the
+    distance that neighbouring vertices should have).
     """
     near, distances = frontier.nearest(frontier.points[vertex], 6 * frontier.dimensions + 1)
     near = near[distances < _FIT_RADIUS]

@@ -14,21 +14,24 @@ MAX_TURN = 0.4  # rad: default of `RoadmapSettings.longest`
 
 @dataclass(frozen=True, slots=True)
 class SearchSettings:
-    """Settings of the searches by evolution strategy (thesis Algorithm 4; docs/roadmaps.md compares them).
+    """Settings of the searches by evolution strategy for the poses (vertices) of a roadmap (thesis Algorithm 4; see docs/roadmaps.md).
 
-    Raises InvalidValue for a value out of range.
+    The spacing is the distance between neighbouring vertices in the task space. Raises InvalidValue for a value out of range.
 
     Attributes:
-        delta: decrease of a vertex's expansion weight (1 at first) for each failed search that started from the vertex.
+        delta: decrease of a vertex's expansion weight (1 at first; no search starts from a vertex of weight 0 or less) for each failed
+            search that started from the vertex.
         frontier: True: start a search only where a point one spacing away is free, and aim at this point.  False: start from all vertices,
             without an aim, as printed in the thesis.
         predict: True: a search that has an aim begins at a posture extrapolated from the neighbours' postures.  False: at the posture of
             its vertex.
-        std: largest standard deviation of a search from a vertex, in ranges of the motors.
-        wide_std: standard deviation of a search for the first pose, or where another search has failed, in ranges of the motors.
-        population: samples per generation; None: 4 + 3 ln(d) for d motors that may move.
+        std: largest standard deviation of a search from a vertex, as a fraction of each motor's range.
+        wide_std: standard deviation of a search for the first pose, or where another search has failed, as a fraction of each motor's
+            range.
+        population: samples per generation; None: 4 + 3 ln(d), rounded down, for d motors that may move.
         patience: factor on the time limit: a search fails after patience * G generations, but not before 100 / m (m: dimension of the task
-            space).  G: number of generations within which 3/4 of the recent successful searches found their vertex.
+            space).  G: number of generations within which 3/4 of the recent successful searches found their vertex.  The limit is 30 d
+            generations until 8 searches have succeeded, and 4 times as long where another search has failed.
         tries: largest number of failed searches around a point.  After so many failed searches with aims within half a spacing of a point,
             no further search aims at this point.
         searches: number of simultaneous searches.
@@ -64,9 +67,9 @@ class RoadmapSettings:
     Raises InvalidValue or UnknownName for a value that is not valid.
 
     Attributes:
-        method: "nes": evolution strategy, thesis Algorithms 2-4, for any costs and coordinates.  "least_squares": on a lattice of task
-            points, only for coordinates with derivatives.  "hybrid": least squares if all coordinates have derivatives, then the evolution
-            strategy for the points that were not reached.
+        method: "nes": evolution strategy, thesis Algorithms 2-4, for any costs and task coordinates.  "least_squares": on a lattice of
+            points in the task space, only for task coordinates with derivatives.  "hybrid": least squares if all task coordinates have
+            derivatives, then the evolution strategy for the regions in which least squares found no poses.
         neighbours: number of nearest vertices to which each vertex is joined.  None: each vertex is joined to the m nearest of the vertices
             that were found before it; m: dimension of the task space (Algorithm 4).
         longest: edges along which a motor turns by more than this [rad] are left out.  None: no edge is left out.

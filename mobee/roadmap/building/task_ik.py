@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Poses with given task coordinates, by least squares, and postures that are similar between neighbours."""
+"""Finds poses with given task coordinates by least squares, and makes the postures of neighbouring poses more similar."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from mobee.roadmap.ik.terms import Aim
 
 
 class TaskIK:
-    """Finds poses that satisfy the terms of a problem and have given task coordinates, by least squares.
+    """Finds poses that are within the tolerances of a problem's terms and have given task coordinates, by least squares.
 
-    `deviations`: (m,) largest accepted deviation of each task coordinate, in its unit. Raises InvalidValue for a coordinate that has no
-    derivative.
+    `problem`: a cost of poses; its terms are the summands. `task`: the m task coordinates, each with its range. `deviations`: (m,) largest
+    accepted deviation of each task coordinate, in its unit. Raises InvalidValue for a coordinate that has no derivative.
     """
 
     def __init__(self, problem: Problem, task: Task, deviations: Array) -> None:
@@ -44,7 +44,8 @@ class TaskIK:
     def starts_around(self, q: Array, std: Array, rng: np.random.Generator) -> Array:
         """Draw start poses (N, n) rad around postures q (N, n) rad.
 
-        `std`: (N,) standard deviations in ranges of the motors. Only the motors that affect the task or the terms are varied.
+        `std`: (N,) standard deviation for each posture, as a fraction of each motor's range. Only the motors that affect the task or the
+        terms are varied.
         """
         low, high = self._problem.limits.T
         here = q[:, self._problem.free]
@@ -58,8 +59,10 @@ class TaskIK:
 
         Returns:
             Poses (N, n) rad, their task coordinates (N, m), violations (N,) and costs (N,).  A violation is 0 for a pose within all
-            tolerances and the task's box; infinite if least squares fails, if the pose is outside the box, or if its task coordinates
-            deviate from y by more than `deviations`; else the sum of weight * residual over the terms that are beyond their tolerances.
+            tolerances and the task's box (the ranges of its coordinates); infinite if least squares fails, if the pose is outside the box,
+            or if its task coordinates deviate from y by more than `deviations`; else the sum of weight * residual over the terms that are
+            beyond their tolerances.  A cost is the sum of weight * residual over all terms.  If least squares fails, the cost and the task
+            coordinates are infinite.
         """
         free = self._problem.free
         q, converged = self._descent.met(self._problem.whole(np.clip(starts[:, free], *self._problem.limits.T)), self._reals(y))
@@ -104,15 +107,16 @@ SWEEPS = 32
 
 
 def smoothed(ik: TaskIK, wanted: Array, q: Array, y: Array, pairs: Ints, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Make the postures of neighbours more similar: solve some poses again, from a start nearer to the mean of their neighbours' postures.
+    """Make neighbouring poses of a roadmap more similar: solve some of them again, from starts nearer to the mean of their neighbours.
 
     Args:
-        ik: solves for task coordinates.
-        wanted: (V, m) task coordinates of the lattice points.
+        ik: finds poses with given task coordinates.
+        wanted: (V, m) task coordinates that the poses should have: the points of a regular grid (lattice) in the task space.
         q: (V, n) rad, poses.
-        y: (V, m) their task coordinates.
+        y: (V, m) the task coordinates that the poses have.
         pairs: (E, 2) indices of poses that are neighbours.
-        rng: draws, in each of 32 passes, which poses are solved again, and whether each starts at the mean or at half the distance to it.
+        rng: draws, in each of 32 passes, which poses are solved again, and whether each starts at the mean or half-way from its old pose to
+            the mean.
 
     Returns:
         Poses (V, n) rad and task coordinates (V, m).  A new pose replaces an old one if it is valid and has a smaller sum of squared joint

@@ -118,14 +118,17 @@ def along(marker: str, direction: ArrayLike, low: float, high: float) -> Task:
 
 
 def motors(ranges: Mapping[str, Range]) -> Task:
-    """Return a task space: the positions of motors (table 3.2, third row); `ranges`: (low, high) rad by name of the motor."""
+    """Return a task space: the positions of motors (table 3.2, third row).
+
+    `ranges`: (low, high) by name of the motor, in rad, or in m for a motor that slides.
+    """
     return Task(tuple(_motor(name, low, high) for name, (low, high) in ranges.items()))
 
 
 def angle(marker: str, about: ArrayLike, zero: ArrayLike, low: float, high: float, direction: ArrayLike | None = None) -> Task:
     """Return a task space of one coordinate: the angle of a marker's direction about an axis, in (-pi, pi] rad.
 
-    Least squares also requires that the direction is perpendicular to the axis; the evolution strategy does not.
+    Roadmaps of the method "least_squares" also require that the direction is perpendicular to the axis; those of "nes" do not.
 
     Args:
         marker: its name.

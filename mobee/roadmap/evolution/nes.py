@@ -84,8 +84,9 @@ _NEGLIGIBLE = 1e-17
 def turned(shape: Array, z: Array, weights: Array, shrink: float) -> Array:
     """Return the updated shape B exp(1/2 (sum_i weights_i z_i z_i^T - shrink I)) of a search distribution, exact to rounding.
 
-    `shape`: B (d, d), or its diagonal (d,); the result has the same form. `z`: (k, d) standard normal samples. `weights`: (k,). The sum has
-    at most rank k; for k < d the Taylor series of the exponential is therefore computed with matrices (k, k).
+    `shape`: B (d, d), or its diagonal (d,); the result has the same form. `z`: (k, d) standard normal samples. `weights`: (k,).
+    `shrink`: factor of the identity I. The sum has at most rank k; for k < d the Taylor series of the exponential is therefore computed
+    with matrices (k, k).
     """
     if shape.ndim == 1:
         diagonal: Array = shape * np.exp(0.5 * (weights @ z**2 - shrink))
@@ -132,9 +133,9 @@ class NES:
         start: (d,) first mean of the search distribution.
         std: first standard deviation, one number or (d,).
         population: samples per generation, at least 4; None: 4 + 3 ln(d), rounded down.
-        method: "full": exponential NES with an evolution path and negative weights.  "separable": the same with a diagonal shape, for many
-            dimensions.  "xnes" and "snes": the published full and diagonal forms with their rates, which need more samples
-            (docs/roadmaps.md).
+        method: "full": exponential NES with an evolution path, and negative weights for the worse samples.  "separable": the same with a
+            diagonal shape matrix, for many dimensions.  "xnes" and "snes": NES with a full and with a diagonal shape matrix as published,
+            with the published learning rates; they usually need more samples than "full" and "separable" (docs/roadmaps.md).
         seed: seed of the samples, or a generator that draws them.
 
     Raises:

@@ -89,7 +89,7 @@ _NONE = np.zeros(3)
 
 
 def position(marker: str, place: ArrayLike, tolerance: float = METRES, weight: float = PER_METRE, offset: ArrayLike | None = None) -> Term:
-    """Return the term that brings a marker to a place (3,) m, root frame (table 3.1). The residual is the distance [m].
+    """Return the term that brings a marker to a place (3,) m, root frame (thesis table 3.1). The residual is the distance [m].
 
     `offset`: (3,) m in the marker's frame; the point there, instead of the marker itself, is brought to the place. A residual of at most
     `tolerance` (5 mm) meets the term; the cost is `weight` (20 per m) times the residual.
@@ -111,7 +111,7 @@ def position(marker: str, place: ArrayLike, tolerance: float = METRES, weight: f
 def orientation(
     marker: str, goal: ArrayLike, tolerance: float = RADIANS, weight: float = PER_RAD, direction: ArrayLike | None = None
 ) -> Term:
-    """Return the term for the orientation of a marker (table 3.1). The residual is the remaining angle [rad].
+    """Return the term for the orientation of a marker (thesis table 3.1). The residual is the remaining angle [rad].
 
     `goal`: a direction (3,), root frame, to which the marker's normal is turned; or a rotation (3, 3) of the marker, root frame.
     `direction`: (3,) in the marker's frame, is used instead of the normal. The residual that the thesis prints, u.u* + 1, is not used: it
@@ -136,10 +136,10 @@ def orientation(
 
 
 def hold(first: str, second: str, distance: float, tolerance: float = METRES, weight: float = PER_METRE) -> Term:
-    """Return the term that keeps two markers at a `distance` [m] from each other (table 3.1); the residual is the distance's error [m].
+    """Return the term that keeps two markers at a `distance` [m] from each other (thesis table 3.1).
 
-    A residual of at most `tolerance` (5 mm) meets the term; the cost is `weight` (20 per m) times the residual. `first`, `second`: names of
-    the markers.
+    The residual is the absolute error of the distance [m]. A residual of at most `tolerance` (5 mm) meets the term; the cost is `weight`
+    (20 per m) times the residual. `first`, `second`: names of the markers.
     """
 
     def residual(pose: Pose) -> Array:
@@ -196,7 +196,7 @@ def gaze(goal: str | ArrayLike, marker: str = "head", tolerance: float = RADIANS
 
 
 def collision(by: str = "depth", weight: float | None = None) -> Term:
-    """Return the term against contacts of solids, with tolerance 0 (table 3.1).
+    """Return the term against contacts of solids, with tolerance 0 (thesis table 3.1).
 
     `by`: "depth": the residual is the sum of the depths [m], whose gradient leads out of contact; "count": it is the number of contacts.
     `weight`: None: 20 per m, or 1 per contact.
@@ -216,7 +216,7 @@ def collision(by: str = "depth", weight: float | None = None) -> Term:
 
 
 def home(posture: ArrayLike | None = None, weight: float = 0.05) -> Term:
-    """Return the term that prefers poses near a posture (n,) rad; None: near the home pose (table 3.1).
+    """Return the term that prefers poses near a posture (n,) rad; None: near the home pose (thesis table 3.1).
 
     The residual is the Euclidean distance, where each motor is divided by its range. The term is only minimised; it has no tolerance. The
     cost is `weight` times the residual.
@@ -263,9 +263,10 @@ def balance(place: ArrayLike | None = None, tolerance: float | None = None, weig
 
 
 def constraints(weight: float = PER_RAD) -> Term:
-    """Return the term for the robot's clauses (conditions on motor positions, thesis eqs. 5.14-5.17), such as those of cables; tolerance 0.
+    """Return the term that keeps the robot's clauses satisfied, with tolerance 0.
 
-    The residual is the sum of the amounts by which the clauses are violated [rad]. The cost is `weight` (2 per rad) times the residual.
+    A clause is a condition on motor positions (thesis eqs. 5.14-5.17), for example from cables that couple several motors. The residual is
+    the sum of the amounts by which the clauses are violated [rad]. The cost is `weight` (2 per rad) times the residual.
     """
 
     def residual(pose: Pose) -> Array:
@@ -372,10 +373,10 @@ def aligned(
 def across(marker: str, axis: ArrayLike, direction: ArrayLike | None = None, tolerance: float = RADIANS, weight: float = PER_RAD) -> Term:
     """Return the term that keeps a marker's normal perpendicular to an axis (3,), root frame; its residual is the error angle [rad].
 
-    `direction`: (3,) in the marker's frame, is used instead of the normal. The term has no derivative, so least squares only checks it
-    afterwards. It is met nevertheless if the same direction has a task coordinate `mobee.tasks.angle` about the same axis: for this
-    coordinate, least squares makes the direction perpendicular to the axis. A residual of at most `tolerance` (5 degrees) meets the term;
-    the cost is `weight` (2 per rad) times the residual.
+    `direction`: (3,) in the marker's frame, is used instead of the normal. The term has no derivative, so the inverse kinematics by least
+    squares does not minimise it, but only checks it at the end. It is met nevertheless if the same direction has a task coordinate
+    `mobee.tasks.angle` about the same axis: for this coordinate, least squares makes the direction perpendicular to the axis. A residual of
+    at most `tolerance` (5 degrees) meets the term; the cost is `weight` (2 per rad) times the residual.
     """
     along, own = unit_vector("axis", axis), None if direction is None else unit_vector("direction", direction)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Damped least squares with restarts, for the terms that have a derivative; the other terms are checked afterwards."""
+"""Damped least squares with restarts for the terms of a pose's cost that have a derivative; the other terms are checked afterwards."""
 
 from __future__ import annotations
 
@@ -25,7 +25,8 @@ class Descent:
     """Damped least squares on the aims (residuals) of a problem, from many start poses.
 
     Args:
-        problem: the aims of its terms with derivatives are minimised; the motors that may move are changed, within their limits.
+        problem: a search for a pose whose cost is a sum of terms. The aims of the terms with derivatives are minimised; the motors that may
+            move are changed, within their limits.
         besides: additional aims with their tolerances, for example of task coordinates. If the goals of these aims differ between the
             starts, they are given to the methods as the argument `goals`.
         threads: number of threads that share the starts; the results do not depend on it.
@@ -48,15 +49,17 @@ class Descent:
 
     @cached_property
     def drawn(self) -> Flags:
-        """Whether each of the d motors that may move affects aims or terms, (d,), and so needs random positions in random start poses."""
+        """Whether each of the d motors that may move needs random positions in random start poses, (d,).
+
+        It needs them if it affects an aim, or a term (except "collision") that has a tolerance but no derivative.
+        """
         return needed(self._problem, self._aims)
 
     def run(self, q: Array, goals: Array | None = None) -> Array:
         """Search from the start poses q (B, n) rad; return only the K solutions whose residuals are all within the tolerances, (K, n) rad.
 
-        `goals`: (B, 26 k), other values of the k additional aims (`besides` of the class) for each start. Row i is the result of
-        `aim_reals` for the k aims of start i, which have the same kinds, links and motors as `besides`, in the same order. None: `besides`
-        for all starts.
+        `goals`: (B, 26 k): row i is what `aim_reals` returns for the k additional aims of start i. They replace the k aims `besides` of the
+        class, and must have the same kinds, links and motors, in the same order. None: the aims `besides` are used for all starts.
         """
         ends, met = self.met(q, goals)
         return ends[met]
@@ -64,9 +67,8 @@ class Descent:
     def met(self, q: Array, goals: Array | None = None) -> tuple[Array, Flags]:
         """Return the solutions (B, n) rad found from the starts q (B, n) rad, and whether each is within the tolerances of all aims, (B,).
 
-        `goals`: (B, 26 k), other values of the k additional aims (`besides` of the class) for each start. Row i is the result of
-        `aim_reals` for the k aims of start i, which have the same kinds, links and motors as `besides`, in the same order. None: `besides`
-        for all starts.
+        `goals`: (B, 26 k): row i is what `aim_reals` returns for the k additional aims of start i. They replace the k aims `besides` of the
+        class, and must have the same kinds, links and motors, in the same order. None: the aims `besides` are used for all starts.
         """
         ends, residuals = self.ends(q, goals)
         met: Flags = (residuals > self._enough).sum(axis=1) == 0
@@ -75,10 +77,10 @@ class Descent:
     def ends(self, q: Array, goals: Array | None = None) -> tuple[Array, Array]:
         """Return the solutions (B, n) rad found from the starts q (B, n) rad, and the residuals of all aims there, (B, aims), m or rad.
 
-        `goals`: (B, 26 k), other values of the k additional aims (`besides` of the class) for each start. Row i is the result of
-        `aim_reals` for the k aims of start i, which have the same kinds, links and motors as `besides`, in the same order. None: `besides`
-        for all starts. The columns of the residuals are the aims of the problem's terms, then `besides`. The number of evaluated poses is
-        added to `problem.evaluations`.
+        `goals`: (B, 26 k): row i is what `aim_reals` returns for the k additional aims of start i. They replace the k aims `besides` of the
+        class, and must have the same kinds, links and motors, in the same order. None: the aims `besides` are used for all starts.
+        The columns of the residuals are the aims of the problem's terms, then the additional aims. The number of evaluated poses is added
+        to `problem.evaluations`.
         """
         from mobee._core.least_squares import descend  # loads the core, so it is imported only when needed
         from mobee.model.engine import robot_handle
@@ -95,8 +97,9 @@ class Descent:
 
 
 def least_squares(problem: Problem, rng: np.random.Generator) -> Array | None:
-    """Return a pose (n,) rad within all tolerances; None if no such pose was found, or no term has aims (residuals for least squares).
+    """Return a pose (n,) rad within the tolerances of all terms of a problem's cost; None if no such pose was found.
 
+    The result is also None if no term has aims (residuals for least squares).
     The first start is the start pose of the problem; the other starts are random and are solved in groups. If several poses of one group
     are within all tolerances, the pose with the lowest cost is returned.
     """
@@ -131,7 +134,7 @@ def _drawn(problem: Problem, rng: np.random.Generator, count: int, which: Flags)
 
 
 def aim_reals(aims: Sequence[tuple[Aim, float | None]]) -> Array:
-    """Return the points, frames, lengths and tolerances of aims as the compiled core reads them, 26 numbers for each aim in turn.
+    """Return the points, frames, lengths and tolerances of aims (residuals) as the compiled core reads them, 26 numbers for each aim.
 
     `aims`: pairs of an aim and its tolerance [m or rad]; None: no tolerance. The result has the shape (26 * number of aims,).
     """

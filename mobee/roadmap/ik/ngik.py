@@ -28,9 +28,10 @@ POPULATION = 20
 class IK:
     """The result of `solve_ik`.
 
-    `q`: (n,) rad, the pose. `reached`: whether all terms that have a tolerance are within it; q is evaluated again for this. `residuals`:
-    residual of each term, by the term's name. `evaluations`: number of evaluated poses. `table`: all contacts of the pose, also those of
-    fields (larger shapes that cause repulsive forces).
+    `q`: (n,) rad, the pose. `reached`: whether the residuals of all terms that have a tolerance are within it. `residuals`: residual of
+    each term, by the term's name. `evaluations`: number of poses that the search evaluated. `table`: all contacts of the pose, also those
+    of fields (larger shapes that cause repulsive forces). The search computes contacts of solids only; for `reached`, `residuals` and
+    `table`, q is evaluated again with all contacts.
     """
 
     q: Array
@@ -41,7 +42,7 @@ class IK:
 
     @property
     def contacts(self) -> tuple[Contact, ...]:
-        """The solid contacts of the pose."""
+        """The contacts between solids in the pose, without those of fields (larger shapes that cause repulsive forces)."""
         return tuple(contact for contact in self.table.contacts() if contact.kind == "solid")
 
 

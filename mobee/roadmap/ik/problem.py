@@ -55,11 +55,11 @@ _MIN_EFFECT = 1e-9
 
 
 def needed(problem: Problem, aims: Iterable[Aim]) -> Flags:
-    """Return for each of the d motors that may move whether random start poses of the search need a random position of it, (d,).
+    """Return which motors must have random positions in the random start poses of a search, (d,) booleans for the motors that may move.
 
-    A motor needs one if it moves a link of one of the `aims` (residuals for least squares), or is the motor of an aim. It also needs one if
-    it changes the residual of a term that has a tolerance but no derivative; this is tested in PROBES (3) random poses. The term
-    "collision" is left out: if the fingers, for example, began at random positions, they would only cause more contacts.
+    These are the motors that move a link of one of the `aims` (residuals for least squares), the motors of aims, and those that change the
+    residual of a term that has a tolerance but no derivative; this is tested in PROBES (3) random poses. The term "collision" is left out:
+    if the fingers, for example, began at random positions, they would only cause more contacts.
     """
     moves = _movers(problem.model.robot, aims)[problem.free]
     others = [one for one in problem.terms if one.aims is None and one.tolerance is not None and one.name != "collision"]
@@ -96,13 +96,14 @@ Cost = Term | Callable[[Pose, Any], ArrayLike]
 class Problem:
     """The search for a pose: a cost, which is a sum of terms, over the d motors that may move; all other motors stay as in `start`.
 
-    Attributes: `model` has only solid shapes; `terms` and `by_name` are the terms; `free` (d,) are the indices of the motors that may move;
-    `limits` (d, 2) rad are their limits, reduced by the margin; `start` (n,) rad; `must`: whether at least one term has a tolerance, so
-    that a pose can be within all tolerances; `evaluations` counts evaluated poses.
+    Attributes: `model`: the model, with only solid shapes; `terms`: all terms; `by_name`: the same, from name to term; `free` (d,): indices
+    of the motors that may move; `limits` (d, 2) rad: their limits, reduced by the margin; `start` (n,) rad: the start pose, moved inside
+    these limits; `must`: whether at least one term has a tolerance, so that a pose can be within all tolerances; `evaluations`: number of
+    evaluated poses.
 
     Args:
         model: robot and world.
-        costs: terms, and plain functions of pose and contacts.
+        costs: terms, or functions that take poses and their contacts and return residuals, see `mobee.roadmap.ik.costs.term`.
         start: (n,) rad; None: home.
         motors: names of parts and motors that may move; None: all.
         margin: distance from the limits [rad], at most a quarter of a motor's range.

@@ -134,11 +134,11 @@ Plain = Callable[..., ArrayLike]
 
 
 class Function:
-    """Calls a user's function once for a batch of poses, or once for each pose if the function does not accept a batch.
+    """Calls a user's cost function once for a batch of N poses, or once for each pose if the function does not accept a batch.
 
-    For a batch, its second argument is the table of all contacts; for one pose, a tuple of the contacts. The first call tests whether the
-    function accepts a batch, that is, returns the same values for it as for the single poses. `contacts`: False if the function takes only
-    the pose.
+    The function returns N numbers for a batch, or one number for one pose. Its first argument is the batch or pose. For a batch, its second
+    argument is the table of all contacts; for one pose, a tuple of the contacts. The first call tests whether the function accepts a batch,
+    that is, returns the same values for it as for the single poses. `contacts`: False if the function takes only the pose.
     """
 
     def __init__(self, function: Plain, contacts: bool = True) -> None:

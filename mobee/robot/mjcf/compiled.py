@@ -46,15 +46,15 @@ def is_mjcf(path: Path) -> bool:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Compiled:
-    """A model as MuJoCo compiles it, with every hinge and slide at zero; lists are in the order of MuJoCo's ids.
+    """A model as MuJoCo compiles it, with hinges and slides at zero; lists are in the order of MuJoCo's ids.
 
-    `path`: path of the file. `model`: MuJoCo's MjModel, a table of arrays. `bodies`, `inertial`, `geoms`, `sites`, `cameras`: the frames of
-    these elements in the world's frame; `inertial`: at the centres of mass. `anchors` (m), `axes`: (joints, 3), a point on the axis and the
-    unit axis of each joint, in the world's frame. `names[kind]`: the names of the elements of a kind ("body", "joint", "geom", "site",
-    "key" and so on); an element without a name gets one from its kind and number. `lines[kind]`: the lines of these elements in the file; 0
-    if MuJoCo does not record the line. `joint_kinds`, `geom_kinds`, `equality_kinds`, `camera_modes`: MuJoCo's type of each such element as
-    text, for example "hinge". `transmissions`: what each actuator acts on, for example "joint". `wraps`: type of each element of all
-    tendons.
+    Joints that an equality with a single joint fixes are at their fixed positions. `path`: path of the file. `model`: MuJoCo's MjModel, a
+    table of arrays. `bodies`, `inertial`, `geoms`, `sites`, `cameras`: the frames of these elements in the world's frame; `inertial`: at
+    the centres of mass. `anchors` (m), `axes`: (joints, 3), a point on the axis and the unit axis of each joint, in the world's frame.
+    `names[kind]`: the names of the elements of a kind ("body", "joint", "geom", "site", "key" and so on); an element without a name gets
+    one from its kind and number. `lines[kind]`: the lines of these elements in the file; 0 if MuJoCo does not record the line.
+    `joint_kinds`, `geom_kinds`, `equality_kinds`, `camera_modes`: MuJoCo's type of each such element as text, for example "hinge".
+    `transmissions`: what each actuator acts on, for example "joint". `wraps`: type of each element of all tendons.
     """
 
     path: Path

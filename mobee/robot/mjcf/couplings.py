@@ -50,7 +50,10 @@ def drives_of(compiled: Compiled) -> dict[int, Drive]:
 
 
 def held_joints(compiled: Compiled) -> set[int]:
-    """Return MuJoCo's numbers of the joints that an equality with a single joint fixes; bodies are drawn at its position."""
+    """Return MuJoCo's numbers of the joints that an equality with a single joint fixes.
+
+    In `compiled`, the frames of the bodies belong to the pose with these joints at their fixed positions.
+    """
     model = compiled.model
     return {int(model.eq_obj1id[k]) for k in _active(compiled, "joint") if model.eq_obj2id[k] < 0}
 

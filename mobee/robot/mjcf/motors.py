@@ -33,8 +33,8 @@ def home_pose(compiled: Compiled, asked: str | None) -> tuple[Array, int | None]
     """Return MuJoCo's position vector qpos at home, and the number of the keyframe that contains it; None if no keyframe does.
 
     `asked`: name of the keyframe, or "zero" for every joint at 0. None: the keyframe whose name is in HOMES ("home", "ready", ...; the
-    first name that exists is used). If there is none, but the file has exactly one keyframe, this keyframe; else the pose in which the file
-    draws the robot. Raises UnknownName if no keyframe has the name `asked`.
+    first name that exists is used). If there is none, but the file has exactly one keyframe, this keyframe; else MuJoCo's reference
+    pose `qpos0`. Raises UnknownName if no keyframe has the name `asked`.
     """
     model, names = compiled.model, compiled.names["key"]
     lower = {name.lower(): index for index, name in enumerate(names)}

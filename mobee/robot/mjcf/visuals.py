@@ -15,7 +15,7 @@ KINDS: dict[str, VisualKind] = {name: name for name in ("sphere", "capsule", "cy
 
 
 def read_visuals(compiled: Compiled, link_of: list[int]) -> tuple[Visual, ...]:
-    """Return the visuals of an MJCF model: for each body the geoms that cannot collide, or all its geoms if all can collide.
+    """Return the visuals (drawn shapes) of an MJCF model: for each body the geoms that cannot collide, or all its geoms if all can collide.
 
     Only geoms of the groups 0 to 2 are taken, which MuJoCo's viewers show. The ground (planes and height fields) and geoms that are fully
     transparent are left out.  `link_of`: for each body the index of the robot's link.

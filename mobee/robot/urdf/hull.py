@@ -114,7 +114,7 @@ class Primitive:
     """A geometric volume with `centre` (3,) m and orientation `rotation` (3, 3).
 
     `kind`: "sphere", "capsule", "cylinder" or "box". `size` in m, as in `mobee.robot.robot.Shape`: sphere (radius,); capsule and cylinder
-    (radius, height); box (x, y, z), full edges.
+    (radius, height), without the caps of the capsule; box (x, y, z), full edges.
     """
 
     kind: ShapeKind

@@ -76,8 +76,9 @@ def _locked(joint: UrdfJoint) -> Frame | None:
 
 
 def read_markers(tree: Tree, skeleton: Skeleton, where: dict[tuple[str, str], str]) -> Iterator[Marker]:
-    """Yield a marker at the frame of each URDF link that a fixed joint attaches, and of each link at an end of the tree.
+    """Yield a marker (a named point with a normal) at the frame of each URDF link in `skeleton.marked`.
 
+    These are the links that a fixed joint, or a joint whose lower and upper limits are equal, attaches, and the links without child links.
     File and line of each marker are added to `where`, as ("marker", name) -> "file:line".
     """
     notes = {link: note for link in skeleton.marked for note in tree.links[link] if note.tag == "mobee" and "marker" in note.attributes}

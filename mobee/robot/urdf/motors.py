@@ -25,7 +25,8 @@ SLIDE = 2.0  # m, of a prismatic joint without limits
 class Drive:
     """The drive of a joint by a motor: joint = scale * motor + offset (rad or m).
 
-    `master`: name of the joint that the motor moves directly, at the end of the chain of <mimic>; it is the motor's name too.
+    `master`: name of the joint that the motor moves directly, at the end of the chain of <mimic>; the motor has this name too, unless the
+    joint's <mobee> element gives it another one.
     """
 
     master: str
@@ -77,8 +78,8 @@ def _multiplier(mimic: Node) -> float:
 def joint_limits(joint: UrdfJoint) -> Array:
     """Return the lower and upper limit (2,) of a joint, rad or m; always finite, since every motor needs limits.
 
-    A joint without limits gets an interval of one turn, or of 2 m, centred at zero. A joint with only one limit gets an interval of the
-    same length that ends at this limit.
+    A joint whose limits are both infinite (`stated_limits`) gets an interval of one turn, or of 2 m if it is prismatic, centred at zero. A
+    joint with one finite limit gets an interval of the same length that ends at this limit.
     """
     low, high = stated_limits(joint).tolist()
     span = SLIDE if joint.kind == "prismatic" else TURN
@@ -88,10 +89,11 @@ def joint_limits(joint: UrdfJoint) -> Array:
 
 
 def stated_limits(joint: UrdfJoint) -> Array:
-    """Return the lower and upper limit (2,) [rad or m] that the file gives a joint; infinite if the file gives no limit.
+    """Return the lower and upper limit (2,) [rad or m] that the file gives a joint; infinite for a turning joint without limits.
 
-    A limit beyond 1e6 counts as infinite. If lower is above upper, both count as infinite: files for PyBullet write joints without limits
-    in this form.
+    If only one limit is given, the other is 0 (URDF's default). A limit beyond 1e6 counts as infinite. If lower is above upper, both count
+    as infinite: files for PyBullet write joints without limits in this form. Raises RobotFileError if the file gives a prismatic joint no
+    limits.
     """
     limit = child(joint.node, "limit")
     if joint.kind == "continuous":
@@ -137,8 +139,9 @@ def read_motor(master: UrdfJoint, driven: Sequence[tuple[int, UrdfJoint, Drive]]
     """Return the motor of the joint `master` and of all joints that mimic it; its limits keep every joint within the joint's limits.
 
     `driven`: for each of these joints, `master` included, (index in the robot, joint, drive). `part`: name of the motor's part. The unit is
-    that of `master`: rad, or m if it is prismatic. Home is 0 if this is outside the limit zones, else the nearest position outside them. A
-    limit zone is a range near a limit, in which the control law pushes inward. Warns of limits that are assumed or ignored.
+    that of `master`: rad, or m if it is prismatic. At home, `master` is at 0, or as near to it as possible outside the motor's limit zones.
+    A limit zone is a range near a limit, in which the control law pushes inward. A <mobee> element of `master` (from `write_urdf`) can give
+    name, acceleration, scale and offset of the motor. Warns of limits that are assumed or ignored.
     """
     limits = joint_limits(master)
     _warn_of_free(master)

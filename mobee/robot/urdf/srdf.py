@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads an SRDF: disabled pairs, groups of joints, named poses, and which of these is home."""
+"""Reads an SRDF: pairs of links that are not tested for contacts, groups of joints, named poses, and which of these poses is home."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Srdf:
 def find_srdf(urdf: Path, robot: str) -> Path | None:
     """Return the path of the SRDF of a URDF: it has the name of the URDF file, or else that of the robot, and the ending .srdf.
 
-    It is searched in the folder of the URDF and in ../srdf; upper and lower case do not matter. Returns None if there is no such file.
+    It is searched for in the folder of the URDF and in ../srdf; upper and lower case do not matter. Returns None if there is no such file.
     """
     folders = (urdf.resolve().parent, urdf.resolve().parent.parent / "srdf")
     for name in dict.fromkeys((urdf.stem.lower(), robot.lower())):
@@ -219,8 +219,8 @@ def choose_home(states: Mapping[str, State], asked: str | None, srdf: Path | Non
 
     `states`: the poses in the SRDF, by name. `asked`: name of the requested pose, or "zero". None: the pose "home"; if the SRDF does not
     have it, the next of the names HOMES ("ready", ...) that it has. If it has none of these names, its only pose; if it has several poses
-    or none, "zero". The pose "zero" has no positions, unless the SRDF has a pose of this name. `srdf`: path for the message. In names,
-    upper and lower case do not matter. Raises UnknownName with the valid names.
+    or none, "zero". The pose "zero" has no positions, unless the SRDF has a pose of this name. `srdf`: path of the SRDF, for the
+    error message. In names, upper and lower case do not matter. Raises UnknownName with the valid names.
     """
     lower = {name.lower(): name for name in states}
     if asked is not None:

@@ -24,7 +24,7 @@ from mobee.robot.xml.pairs import role_elements
 
 @dataclass(slots=True)
 class GeometryWriter:
-    """Writes the shapes of one robot as URDF elements.
+    """Writes the shapes of one robot as URDF elements: solids (volumes of its body) and fields (volumes that cause repulsive forces).
 
     `folder`: for the files of meshes; it is created for the first mesh. `written`: number of meshes that were written.
     """
@@ -35,8 +35,9 @@ class GeometryWriter:
     def solid(self, link: ET.Element, shape: Shape, point: Array, note: dict[str, str]) -> None:
         """Add a solid to the element `link`; a capsule is written as a cylinder and two spheres.
 
-        `point`: (3,) m, origin of the link's frame in the root frame. `note`: attributes for which URDF has no place (part, base); they are
-        written in an element <mobee>, if there are any.
+        `point`: (3,) m, origin of the link's frame in the root frame. `note`: attributes that URDF does not have; they are written in an
+        element <mobee>, if there are any: "part", the name of the shape's part, and "base", "true" if the shape is never tested against
+        world objects, else "false".
         """
         for name, part in _parts(shape):
             geometry = self._geometry(part)
@@ -51,7 +52,7 @@ class GeometryWriter:
         """Add a field to the element `link`, as an element <mobee>, because URDF has no element for fields.
 
         A field is a volume that causes a repulsive force. `point`: (3,) m, origin of the link's frame in the root frame. `note`: further
-        attributes of the element <mobee> (part, base).
+        attributes of the element <mobee>, "part" and "base" as in `solid`.
         """
         element = ET.SubElement(link, "mobee", {"field": shape.name} | note)
         _origin(element, shape, point)
@@ -113,9 +114,10 @@ def write_urdf(robot: Robot, path: str | Path) -> Path:
 
     Every link's frame is at its joint, with the orientation of the root frame at zero pose. One joint represents each motor: the first one
     whose position equals the motor's, else the motor's first joint; the motor's other joints mimic it. Markers are links on fixed joints.
-    `load_robot` reads the file as the same robot with these differences: it has no clauses and no cameras; `least_lever` is 0;
-    the visuals are the solids; `zone_ends_at_home` is True for all motors; a convex shape with more than 64 corners is replaced by an
-    enclosing hull with at most 64. Raises InvalidValue for a joint that no motor or several drive.
+    `load_robot` reads the file as the same robot with these differences: it has no clauses (conditions on several motor positions) and no
+    cameras; `Robot.least_lever`, which scales the forces of fields, is 0; the visuals are the solids; `Motor.zone_ends_at_home`, which ends
+    a limit zone at home, is True for all motors; a convex shape with more than 64 corners is replaced by an enclosing hull with at most 64.
+    Raises InvalidValue for a joint that no motor or several drive.
     """
     path = Path(path)
     drives_of(robot)  # raises for a joint without a master

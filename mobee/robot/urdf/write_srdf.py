@@ -76,7 +76,10 @@ def write_disabled(path: Path, base: Path | None, name: str, pairs: Iterable[tup
 
 
 def disabled_and_enabled(path: Path) -> tuple[set[NamePair], set[NamePair]]:
-    """Return the pairs of links in <disable_collisions>, and those in <enable_collisions>, of an SRDF file; raises RobotFileError."""
+    """Return the pairs of links in <disable_collisions>, and those in <enable_collisions>, of an SRDF file, as pairs of link names.
+
+    Raises RobotFileError if the file cannot be read.
+    """
     root = read_xml(path)
     return _pairs(root, "disable_collisions"), _pairs(root, "enable_collisions")
 

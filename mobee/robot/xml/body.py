@@ -19,7 +19,10 @@ HEAVIEST = 1e6  # kg
 
 
 def read_mass(node: Node, draft: Draft, place: Place) -> None:
-    """Read a <mass> and add it to the draft; several masses on one link are added up later. RobotFileError if it is not valid."""
+    """Read a <mass> and add it to `draft`, the robot read so far; raises RobotFileError if it is not valid.
+
+    Several masses on one link are added up later.
+    """
     mass = node.positive("value", unit="kilograms")
     if mass > HEAVIEST:
         node.fail("value", f"{mass:g} is too large", "Masses are in kilograms")
@@ -35,7 +38,8 @@ FLAT = 1e-6  # a hull thinner than this part of its length has no inside that a 
 def read_convex(node: Node) -> Volume:
     """Return the volume of a <convex> element, whose attribute `points` has x y z [m] of each corner relative to its centre.
 
-    Its rotation is computed as that of a <box>. Raises RobotFileError for too few or too many points, or points in one plane.
+    Its rotation is that of a <box> with the same attributes (`mobee.robot.xml.volume.box_rotation`). Raises RobotFileError for too few or
+    too many points, or points in one plane.
     """
     numbers = node.numbers("points")
     if len(numbers) % 3 or not 4 <= len(numbers) // 3 <= MOST_POINTS:
@@ -51,10 +55,11 @@ MOST_SHAPES = 2000  # the number of tested pairs grows with the square
 
 
 def read_skeleton(node: Node, draft: Draft, place: Place, centre: Array, axis: Array, length: float) -> None:
-    """Add to the draft the solid and the field that the attributes `radius` and `field` of a <link> or <joint> describe.
+    """Add the solid and the field that the attributes `radius` and `field` of a <link> or <joint> describe.
 
-    Both are cylinders; a field is a volume that causes a repulsive force. `centre`: (3,) m, of the cylinders, root frame. `axis`: (3,),
-    direction of their axis, not necessarily a unit vector. `length`: their length, m. Raises RobotFileError if the element is not valid.
+    They are added to `draft`, the robot read so far. Both are cylinders; a field is a volume that causes a repulsive force. `centre`: (3,)
+    m, of the cylinders, root frame. `axis`: (3,), direction of their axis, not necessarily a unit vector. `length`: their length, m. Raises
+    RobotFileError if the element is not valid.
     """
     for attribute, role in (("radius", "solid"), ("field", "field")):
         if node.number(attribute, 0.0) == 0:
@@ -77,9 +82,10 @@ def read_skeleton(node: Node, draft: Draft, place: Place, centre: Array, axis: A
 
 
 def read_shape(node: Node, draft: Draft, place: Place) -> None:
-    """Read a <sphere>, <capsule>, <cylinder>, <box> or <convex> and add its solid or field to the draft; RobotFileError if invalid.
+    """Read a <sphere>, <capsule>, <cylinder>, <box> or <convex>, and add its solid or field to `draft`, the robot read so far.
 
-    A field, a shape with the attribute `field`, is a volume that causes a repulsive force.
+    A field, a shape with the attribute `field`, is a volume that causes a repulsive force. Raises RobotFileError if the element is not
+    valid.
     """
     volume = read_convex(node) if node.tag == "convex" else read_volume(node)
     name = node.optional("name") or free_name(draft, f"{draft.links[place.link]}_{node.tag}")
@@ -94,7 +100,10 @@ def read_shape(node: Node, draft: Draft, place: Place) -> None:
 
 
 def add_shape(node: Node, draft: Draft, shape: Shape, place: Place) -> None:
-    """Add a shape to the draft, with its line, its element and whether it belongs to the base; RobotFileError for too many shapes."""
+    """Add a shape to `draft`, the robot read so far; raises RobotFileError if there are too many shapes.
+
+    The line of `node` in the file, the index of the current element and whether the shape belongs to the base are recorded too.
+    """
     if len(draft.shapes) >= MOST_SHAPES:
         node.fail("size of the file", f"more than {MOST_SHAPES} shapes", "Join small shapes, or leave out what nothing can touch")
     if place.base:
@@ -106,7 +115,7 @@ def add_shape(node: Node, draft: Draft, shape: Shape, place: Place) -> None:
 
 
 def free_name(draft: Draft, name: str) -> str:
-    """Return the name, with a number appended if a shape of the draft already has it."""
+    """Return the name, with a number appended if a shape of `draft`, the robot read so far, already has it."""
     free = name
     while free in draft.shape_names:
         free = f"{name}_{draft.shape_names[name]}"
@@ -115,7 +124,7 @@ def free_name(draft: Draft, name: str) -> str:
 
 
 def read_marker(node: Node, draft: Draft, place: Place) -> None:
-    """Read a <marker> and add it to the draft; raises RobotFileError if it is not valid.
+    """Read a <marker> and add it to `draft`, the robot read so far; raises RobotFileError if it is not valid.
 
     Without a normal in the file the normal is the z axis of the marker's rotation, or +x if there is no rotation either. Without a
     rotation in the file it is the smallest rotation that turns z to the normal.

@@ -18,13 +18,14 @@ from mobee.robot.xml.node import Node
 class Draft:
     """The elements of a robot file that were read so far; indices as in `mobee.robot.robot.Robot`.
 
-    `subtree`: for each link, the index of the element above it that has the attribute noSelfCollision, -1: none. `drives`: for each joint,
-    its XML element and the name of its motor. `parts`: name -> its XML elements. `hands`: dict from the index of an element with
-    noSelfCollision to its name; the name appears in the reasons why pairs are not tested. `elements`: the root, and all <link> and <joint>
-    elements. `hosts`: for each shape, the index of its element. `shape_names`: name of a shape -> the number that is appended if another
-    shape shall have this name. `hides`: camera -> its XML element, and the names of the links that it does not show. `constraints`:
-    part and XML element of each constraint list. `ignores`: <ignore> elements. `others`: included robots, with the XML elements that
-    include them. `where`: (kind, name) -> "file:line".
+    `subtree`: for each link, the index of the element above it that has the attribute noSelfCollision, -1: none; the shapes below such an
+    element, usually a hand, are not tested for contacts with each other. `drives`: for each joint, its XML element and the name of its
+    motor. `parts`: name -> its XML elements. `hands`: dict from the index of an element with noSelfCollision to its name, for texts that
+    state why two links are not tested for contacts. `elements`: the root, and all <link> and <joint> elements. `hosts`: for each shape, the
+    index of its element. `shape_names`: name of a shape -> the number that is appended if another shape gets this name. `base_shapes`:
+    indices of shapes that are not tested against world objects. `hides`: camera -> its XML element, and the names of the links that it does
+    not show. `constraints`: part and XML element of each constraint list. `ignores`: <ignore> elements. `others`: included robots, with the
+    XML elements that include them. `where`: (kind, name) -> "file:line".
     """
 
     links: list[str] = field(default_factory=lambda: ["base"])
@@ -61,8 +62,9 @@ class Place:
     `point`: (3,) m, root frame, the end of the current <link>, at which the links and joints inside it are attached. `start`: (3,) m, root
     frame, the start of this <link>, to which its shapes and markers are relative. `link`: index of the robot's link. `carrier`: index of
     the link to which elements with turns="false" belong: directly inside a <joint> it is the link that carries the joint, elsewhere it is
-    `link`. `part`, `motor`: names of the current part and motor, "": none. `subtree`: index of the element whose attribute noSelfCollision
-    applies, -1: none. `base`: whether shapes belong to the base. `element`: index of the current element.
+    `link`. `part`, `motor`: names of the current part and motor, "": none. `subtree`: index of the outermost element around this
+    position that has the attribute noSelfCollision (see `Draft`), -1: none. `base`: whether shapes here belong to `Draft.base_shapes`.
+    `element`: index of the current element.
     """
 
     point: Array
@@ -79,7 +81,7 @@ class Place:
 def enter(node: Node, draft: Draft, place: Place, name: str) -> Place:
     """Add a <link> or <joint> to the elements of the draft and return the position of the reader inside it.
 
-    `place`: position outside it. `name`: name of the element; it appears in the reasons why pairs are not tested (`Draft.hands`).
+    `place`: position outside it. `name`: name of the element, for texts that state why two links are not tested for contacts.
     """
     index = len(draft.elements)
     if node.flag("noSelfCollision") and place.subtree < 0:

@@ -81,7 +81,7 @@ def parse_xml(path: Path, handler: LineHandler) -> None:
     """Parse an XML file and send its elements to the SAX handler `handler`.
 
     Entities and external references are refused (they can exhaust memory or read other files).
-    Raises RobotFileError when the file is missing, not a regular file, larger than 8 MB, not XML or hostile.
+    Raises RobotFileError when the file is missing, not a regular file, larger than 8 MB, hostile or not XML.
     """
     parse_content(path, read_content(path), handler)
 
@@ -89,8 +89,8 @@ def parse_xml(path: Path, handler: LineHandler) -> None:
 def parse_content(path: Path, content: bytes, handler: LineHandler) -> None:
     """Parse an XML text and send its elements to the SAX handler `handler`.
 
-    `content`: the bytes of the file. `path`: path of the file, for messages. Raises RobotFileError if the content is not XML or hostile
-    (entities and external references).
+    `content`: the bytes of the file. `path`: path of the file, for messages. Raises RobotFileError if the content is not XML, or if it
+    is hostile (it has entities or external references).
     """
     try:
         defusedxml.sax.parseString(content, handler)
@@ -138,8 +138,8 @@ _ATTRIBUTE = re.compile(rb"""\s*([\w:.-]+)\s*=\s*("[^"<]*"|'[^'<]*')""")
 class Repair:
     """A repair of a faulty file.
 
-    `line`: line of the fault. `what`: the change, in words. `remedy`: for the user. `error`: the error that the file would cause without
-    it.
+    `line`: line of the fault. `what`: the change, in words. `remedy`: what the user can do. `error`: the error that the file would cause
+    without the repair.
     """
 
     line: int

@@ -45,8 +45,8 @@ GENERATION = "VirtualSkin or MoBeE, 2011 to 2014"
 class Evidence:
     """A sign that a file was written for the programs of 2010 to 2014.
 
-    `node`: the element that shows it. `what`: the sign, in words. `generation`: names and years of the programs. `certain`: True if MoBeE
-    0.1 could not read the file, so that it cannot be a file of MoBeE 0.1.
+    `node`: the element that shows it. `what`: the sign, in words. `generation`: names and years of the programs. `certain`: True if the
+    sign cannot occur in a file of the later version 0.1 of the format (`mobee.robot.xml.versions`), because MoBeE 0.1 could not read it.
     """
 
     node: Node

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rewrites worlds of the programs of 2011 to 2014 (<WorldList>) into today's grammar."""
+"""Rewrites world files of VirtualSkin and MoBeE of 2011 to 2014 (root element <WorldList>) into the current XML grammar (<World>)."""
 
 from __future__ import annotations
 

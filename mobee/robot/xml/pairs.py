@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads and writes <ignore> tags: pairs of links or shapes that are not tested."""
+"""Reads and writes <ignore> tags of a robot file: pairs of links or shapes that are not tested for contacts."""
 
 from __future__ import annotations
 

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads a robot from zero-position XML (thesis 2.3.1); the grammar is in robots/README.md."""
+"""Reads a robot from zero-position XML, MoBeE's own format for robots (thesis 2.3.1).
+
+A file describes the robot in the pose in which every joint is at 0, with all axes in the root frame. The grammar is in
+mobee/robot/robots/README.md.
+"""
 
 from __future__ import annotations
 

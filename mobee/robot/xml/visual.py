@@ -28,7 +28,10 @@ NARROWEST, WIDEST = 1.0, 170.0  # degrees
 
 
 def read_visual(node: Node, draft: Draft, place: Place) -> None:
-    """Read a <visual>, a mesh file or a shape with its size in m, and add it to the draft; raises RobotFileError if it is not valid."""
+    """Read a <visual> (a mesh file, or a shape with its size in m) and add it to the draft; raises RobotFileError if it is not valid.
+
+    `draft`: the elements of the robot file that were read so far. `place`: position of the <visual> in the tree of the file.
+    """
     rotation = read_rotation(node) if "rotation" in node.attributes else np.eye(3)
     link = place.link if node.flag("turns", default=True) else place.carrier
     kind: VisualKind = "mesh"
@@ -59,8 +62,9 @@ def _color(node: Node) -> Channels | None:
 def read_camera(node: Node, draft: Draft, place: Place) -> None:
     """Read a <camera> and add it to the draft; raises RobotFileError if it is not valid.
 
-    The camera has the rotation of the file. Without one it looks along the vector (nx, ny, nz), or along -x if this is absent too, and its
-    picture is upright at zero pose. The vector has the axes of the root frame.
+    The camera has the rotation of the file. Without one its direction of view is the vector (nx, ny, nz) in the root frame, or -x if this
+    is absent too, and its picture is upright at zero pose. `draft`: the elements of the robot file that were read so far. `place`: position
+    of the <camera> in the tree of the file.
     """
     name = node.text("name")
     if name in draft.cameras:
@@ -79,9 +83,9 @@ def read_camera(node: Node, draft: Draft, place: Place) -> None:
 
 
 def finished_cameras(draft: Draft) -> dict[str, Camera]:
-    """Return the cameras of a complete draft, by name, each with the links that are not drawn in its pictures (`Camera.hidden`).
+    """Return the cameras of a robot, by name, each with the links that are not drawn in its pictures (`Camera.hidden`).
 
-    Raises RobotFileError for a link that the robot does not have.
+    `draft`: all elements of the robot's file. Raises RobotFileError for a link that the robot does not have.
     """
     found = {}
     for name, camera in draft.cameras.items():

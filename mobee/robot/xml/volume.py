@@ -34,8 +34,9 @@ class Volume:
 
     `kind`: "sphere", "capsule", "cylinder", "box" or "convex". `size` in m, as in `mobee.robot.robot.Shape`: sphere (radius,); capsule and
     cylinder (radius, height); box (x, y, z), full edges; convex (). `vertices`: (v, 3) m, corners of a convex volume in its
-    own frame, which has its origin at `centre`; None for the other kinds. `centre` (3,) m and `rotation` (3, 3): along the axes of the root
-    frame; the centre is relative to the start of the link or joint that contains the volume.
+    own frame, which has its origin at `centre`; None for the other kinds. `centre` (3,) m: relative to the start of the link or joint that
+    contains the volume, along the axes of the root frame; of a world object: in the root frame. `rotation` (3, 3): from the volume's own
+    frame to the axes of the root frame.
     """
 
     kind: ShapeKind
@@ -61,7 +62,8 @@ def read_volume(node: Node) -> Volume:
 def box_rotation(node: Node) -> Array:
     """Return the rotation (3, 3) that a <box> or <convex> element describes.
 
-    The height of the box (its y axis) is along (hx, hy, hz), or along y if these are absent; then the box turns by `angle` [deg] about it.
+    The height of the box (its y axis) is along (hx, hy, hz), or along y if these are absent. Its rotation about the height is that of
+    `height_along` with the attribute `angle` [deg], or 0 if this is absent.
     """
     return height_along(direction(node, AXIS, (0.0, 1.0, 0.0)), np.deg2rad(node.number("angle", 0.0)))
 
@@ -84,7 +86,8 @@ def height_along(axis: Array, angle: float) -> Array:
 def height_and_angle(rotation: Array) -> tuple[Array, float]:
     """Return the axis (unit vector (3,)) and the angle [rad] for which `height_along` places a box as `rotation` (3, 3) does.
 
-    The rotation may differ by half a turn that does not change the box.
+    If the height axis of `rotation` is more than 120 deg from y, the result is for the box after half a turn about its own x axis, which
+    does not change the box.
     """
     if rotation[1, 1] < HALFWAY:
         rotation = rotation * np.array([1.0, -1.0, -1.0])  # the same box

@@ -47,8 +47,10 @@ class Quality:
 class Unobservable:
     """A direction in the space of the parameters about which the pictures give almost no information.
 
-    `information`: singular value of this direction, with the parameters scaled by their prior deviations; 0: no information at all.
-    `weights`: components of the direction, by name of the parameter; small ones are left out.
+    `information`: singular value s of this direction, of the derivatives of the residuals by the parameters (residuals in units of the
+    noise, parameters in units of their prior deviations). The pictures reduce the prior deviation along the direction to 1 / sqrt(1 + s^2)
+    of its value; s = 0: no information at all. `weights`: components of the direction, a unit vector, by name of the parameter; small
+    ones are left out.
     """
 
     information: float

@@ -105,8 +105,9 @@ def moved_parts(rig: Rig, part: str) -> tuple[str, ...]:
 def watch_hand(watcher: Watcher, postures: Array, part: str, progress: Callable[[float], None] = lambda share: None) -> list[Observation]:
     """Move the head and the arm `part` through postures (K, n) rad; return the observations of the tag from the cameras.
 
-    `progress`: called with the share of postures that are done. Wrong encoders of the head (`CameraErrors.encoders`) are simulated in the
-    pictures: the encoders have the right values, but in the pictures the head, with its cameras, is turned by the offsets.
+    `progress`: called with the share of postures that are done, 0 to 1. The offsets of the head's encoders (`CameraErrors.encoders`) are
+    simulated in the pictures only: a picture shows the head, with its cameras, at the simulated posture plus the offsets; the recorded
+    encoder values are those of the simulated posture, with noise.
     """
     rest, found = RESTING * PERIOD + 0.1, []
     for number, posture in enumerate(postures):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Chooses postures in which a robot sees the tag on its palm: within reach, without contact, well spread in the pictures of all cameras."""
+"""Chooses postures in which a robot sees the AprilTag on its palm: near, without contact, well spread in the pictures of all cameras."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ LIMIT = 0.04  # share of a motor's range that is left free at its limits
 
 
 def choose_postures(rig: Rig, model: Model, settings: CameraSettings, part: str, count: int, seed: int) -> Array:
-    """Return postures (count, n) rad of the head and one arm in which all cameras see the tag, without contacts.
+    """Return postures (count, n) rad of the head and one arm in which all cameras see the AprilTag on the palm, without contacts.
 
     The other motors are at home. Postures are drawn at random within the limits. Of the suitable ones, each next posture is the one
-    farthest from those already chosen, by the tag's position in the pictures, its distance and angle, and the head's position. The result
-    is sorted such that successive postures are near each other.
+    farthest from those already chosen, by the tag's position in the pictures, its distance and angle, and the positions of the head's
+    motors. The result is sorted such that successive postures are near each other.
 
     Args:
         rig: the robot, its cameras and the tag.

@@ -85,15 +85,15 @@ class _Problem:
 
 
 def calibrate(rig: Rig, observations: Sequence[Observation], settings: CameraSettings, corner_noise: float = CORNER_NOISE) -> Calibration:
-    """Find the mounts of cameras and tag, the offsets of encoders, and the latency, from observations of the tag.
+    """Estimate the errors of the mounts (poses of cameras and tag on their links), the head's encoders, and the latency of pictures.
 
-    The residuals of a picture are weighted by their covariance: noise of the corners, and noise of the encoders and of the stamp, which
-    moves all corners of a picture together.  The tolerances in `settings` are the prior.  The loss is soft L1.
+    The residuals of a picture are weighted by their covariance: noise of the corners, and noise of the encoders and of the stamp (the time
+    of the picture), which moves all corners of a picture together.  The prior follows from the tolerances in `settings`.  Loss: soft L1.
 
     Args:
         rig: the robot, its cameras at the positions of the model, and the tag.
         observations: pictures of the tag, with the encoders at their stamps.
-        settings: the tolerances, and the jitter of the stamps.
+        settings: the tolerances of the errors, and the jitter of the stamps.
         corner_noise: standard deviation of a measured corner along column and row, px.
 
     Raises:

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Objects that two cameras see: detectors, positions with size and covariance, tracks with permanent names, and cameras that fail."""
+"""Objects that two cameras see: detectors, positions with size and covariance, tracks with permanent names, and camera failures."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The detectors by name; others are given as `module:name`, or as the file of a network."""
+"""Makes a detector from its name in `DETECTORS`, from `module:name` (a function of the user), or from the file of a trained network."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ DETECTORS: dict[str, DetectorOf] = {"color": by_color}
 
 
 def detector_of(given: str | DetectorOf, things: Sequence[Thing]) -> Detector:
-    """Return a detector of the given things.
+    """Return a detector of the given things (kinds of objects of known shape, size and colour).
 
     Args:
-        given: "color", `module:name`, a function that takes things and returns a detector, or the path of a file that `mobee detector
-            train` wrote; such a path ends in .onnx.
+        given: "color" (finds regions with the colours of the things); a function that takes things and returns a detector, or the text
+            `module:name` of such a function; or the path of a file that `mobee detector train` wrote, which ends in .onnx.
         things: the things to be found.
 
     Raises:

@@ -47,14 +47,14 @@ class Eyes:
 
 
 def eyes_at(rig: Rig, x: Array, moment: Moment, uncertainty: Array | None = None, jitter: float = 0.0) -> Eyes:
-    """Return the cameras of a rig, with their uncertainty, at the stamp of a picture.
+    """Return the cameras of a rig, with their uncertainty, at the stamp (time) of a picture.
 
     Args:
         rig: the robot and its cameras.
         x: the calibration's parameters (P,).
-        moment: encoders at the stamp.
+        moment: encoder values at the stamp, with velocities and variances.
         uncertainty: covariance (P, P) of the parameters; None: they are exact.
-        jitter: standard deviation of the stamp, s.
+        jitter: standard deviation of the error of the stamp, s.
     """
     transforms = link_transforms(rig.robot, rig.posture(x, moment.q, moment.dq))
     eyes, motions, slopes = [], [], []

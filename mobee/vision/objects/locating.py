@@ -26,12 +26,12 @@ APART = 0.5  # of the sum of two things' half diameters: nearer things are the s
 def locate_all(
     things: Sequence[Thing], detections: Mapping[str, Sequence[Detection]], eyes: Eyes, solids: Sequence[WorldObject] = ()
 ) -> list[Placed]:
-    """Return the positions of all things that both cameras see, the best fits first.
+    """Return the positions of all things that both cameras see, the thing whose shape fits the two outlines best first.
 
     Args:
         things: the things that may be seen.
         detections: the detections in each picture, by name of the camera.
-        eyes: the two cameras at the stamp of the pictures.
+        eyes: the two cameras, with their poses at the time stamp of the pictures.
         solids: known boxes.  A thing whose computed shape clearly reaches into a box is left out: it may be only a flat picture on the box.
     """
     found: list[tuple[Placed, Thing, int, int]] = []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Regions of a thing in a picture, and their outlines, as detections."""
+"""Regions of a picture that show a thing (an object of known shape, size and colour), and their outlines, as detections."""
 
 from __future__ import annotations
 
@@ -17,11 +17,12 @@ SOLID = 0.6  # share of its convex hull that a region must fill: the things are 
 
 
 def outlined(name: str, likeness: NDArray[np.float32]) -> list[Detection]:
-    """Return the regions of a picture that show the thing `name`, as detections.
+    """Return the regions of a picture that show a thing (an object of known shape, size and colour), as detections.
 
-    `likeness`: (H, W), either the share of each pixel that the thing covers, 0 to 1, or larger numbers that are proportional to this share.
-    Each value is divided by the largest value in the 5 x 5 pixels around it, unless this is below 1; the result is used as the share. Small
-    regions, and regions that are far from convex, are left out.
+    `name`: name of the thing. `likeness`: (H, W), either the share of each pixel that the thing covers, 0 to 1, or larger numbers that are
+    proportional to this share. The share of a pixel is computed as its number divided by the largest number of its region in the 5 x 5
+    pixels around it, or by 1 if the largest number is below 1. Left out are regions of less than 40 pixels, regions with fewer than 16
+    outline points inside the picture's border, and regions that fill less than 60 % of their convex hull.
     """
     height, width = likeness.shape
     found = []

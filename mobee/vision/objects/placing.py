@@ -107,7 +107,7 @@ _NORMALS = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)
 
 
 def place(thing: Thing, outlines: Sequence[Outline], eyes: Eyes) -> Placed | None:
-    """Return the position of a thing from its outlines; None if the outlines do not fit the thing, or it is too near or too far.
+    """Return position, rotation and size of a thing from its outlines; None if they do not fit the thing, or it is too near or too far.
 
     `outlines`: one for each camera, in the order of the cameras of `eyes`.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Silhouettes of spheres, upright cylinders and boxes: the points at which lines in the picture's plane touch them."""
+"""Silhouettes of spheres, upright cylinders and boxes: the points whose images are farthest along given directions of a picture."""
 
 from __future__ import annotations
 

@@ -31,7 +31,10 @@ class Thing:
 
 
 def things_in(world: World) -> list[Thing]:
-    """Return a thing for each target of a world that is a sphere, cylinder or box and has a colour; positions are ignored."""
+    """Return a `Thing` (name, shape, size, colour) for each target of a world that is a sphere, cylinder or box and has a colour.
+
+    A target is an object with the role "target". The positions of the objects are not used.
+    """
     kinds: dict[str, Kind] = {kind: kind for kind in KINDS}
     return [
         Thing(item.name, kinds[item.kind], item.size, item.color[:3])

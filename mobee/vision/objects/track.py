@@ -22,7 +22,7 @@ LOOKS = 8  # over which size and orientation are averaged at least
 
 @dataclass(frozen=True, kw_only=True)
 class TrackSettings(Settings):
-    """Settings for tracking objects; a look is a pair of pictures at one time.
+    """Settings for tracking objects; a look is a pair of pictures, one from each camera, taken at the same time.
 
     The position of an object at rest is modelled as a slow random walk; the velocity of a moving object as an Ornstein-Uhlenbeck process
     about 0.
@@ -80,7 +80,7 @@ class Innovation:
 
 
 class Track:
-    """An object that is followed from look to look; a look is a pair of pictures at one time.
+    """An object that is followed from look to look; a look is a pair of pictures, one from each camera, taken at the same time.
 
     `name`: unique; empty until enough looks have shown the object (`TrackSettings.hits`). `born`: time [s] of the first look. `t`: time [s]
     of the newest look. `seen`: time [s] of the newest look that showed the object. `looks`: whether each of the latest looks showed the
@@ -121,13 +121,13 @@ class Track:
     def rotation(self) -> Array:
         """The rotation (3, 3) of the shape's axes in the root frame: a turn about the vertical z axis, averaged over the looks.
 
-        A look is a pair of pictures at one time.
+        A look is a pair of pictures, one from each camera, taken at the same time.
         """
         return upright(self._yaw)
 
     @property
     def size(self) -> Array:
-        """The lengths (g,) m of the shape, averaged over the looks (a look is a pair of pictures at one time)."""
+        """The lengths (g,) m of the shape, averaged over the looks (pairs of pictures taken at the same time)."""
         return self._size.copy()
 
     @property
@@ -148,9 +148,10 @@ class Track:
     def best(self, placed: Placed, t: float, turned: float) -> tuple[Innovation, bool] | None:
         """Compare a position seen at time t [s] with the prediction; return the comparison, and whether it assumes a moving object.
 
-        The prediction is that for an object at rest, unless the object moves already or the position is improbable at rest
-        (`TrackSettings.surprise`); then it is that for a moving object. Return None if the position is also too improbable for a moving
-        object (`TrackSettings.gate`). `turned`: angle [rad] by which the gaze has rotated since the last look (pair of pictures).
+        The prediction for an object at rest is used if the object no longer counts as moving (`TrackSettings.moves_for`) and the squared
+        Mahalanobis distance from this prediction is at most `TrackSettings.surprise`. Otherwise the prediction for a moving object is used;
+        return None if the distance from it is above `TrackSettings.gate`. `placed`: the seen position. `turned`: angle [rad] by which the
+        gaze has rotated since the last look (pair of pictures).
         """
         if t > self._moving_until:
             rest = self.innovation(placed, t, turned, moving=False)

@@ -18,11 +18,11 @@ IMPOSSIBLE = 1e6  # cost of a place outside a track's gate
 
 
 class Tracker:
-    """The tracks of all seen objects of the given things (kinds of objects), in the root frame at the time of the pictures.
+    """The tracks of all seen objects of the given things (kinds of objects); positions are in the root frame.
 
-    The first object of a thing has the thing's name; the next ones have the names NAME_2, NAME_3, up to `TrackSettings.most` objects. If
-    all these names are in use, a new track takes the name of an object that was last seen before the track began. So an object that was
-    hidden or moved elsewhere keeps its name.
+    A look is a pair of pictures at one time. The first object of a thing has the thing's name; the next ones have the names NAME_2, NAME_3,
+    up to `TrackSettings.most` objects. If all these names are in use, a new track takes the name of an object that was last seen before the
+    track began. So an object that was hidden or moved elsewhere keeps its name.
     """
 
     def __init__(self, things: Sequence[Thing], settings: TrackSettings | None = None) -> None:
@@ -35,8 +35,8 @@ class Tracker:
     def tracks(self) -> list[Track]:
         """The tracks of objects that have a name, sorted by name.
 
-        An object gets a name after it was seen in enough looks (`TrackSettings.hits`). It is seen at present if `seen` of its track is the
-        time of the last look.
+        An object gets a name after enough looks (pairs of pictures) have shown it (`TrackSettings.hits`). It is seen at present if `seen`
+        of its track is the time of the last look.
         """
         return sorted((track for track in self._tracks if track.name), key=lambda track: track.name)
 
@@ -46,7 +46,7 @@ class Tracker:
         self._t = -np.inf
 
     def update(self, t: float, places: Sequence[Placed], turned: float = 0.0) -> None:
-        """Update all tracks with the positions seen in one look.
+        """Update all tracks with the positions seen in one look (a pair of pictures at one time).
 
         Args:
             t: time of the pictures, s; later than that of the last look.

@@ -21,9 +21,9 @@ class Lesson:
 
     The teacher is a robot that carries the ball; the learner is a robot that learns to locate it.
 
-    `pixels`: (2, 2) px, column and row of the ball in the left picture, then in the right one. `moment`: the encoders at the stamp.
-    `reported`: (3,) m, root frame, position of the ball that the teacher reports. `true`: its true position. `pose`: index of the teacher's
-    pose.
+    `pixels`: (2, 2) px, column and row of the ball in the left picture, then in the right one. `moment`: the learner's encoders at the
+    time stamp of the pictures. `reported`: (3,) m, root frame, position of the ball that the teacher reports. `true`: its true position.
+    `pose`: index of the teacher's pose.
     """
 
     pixels: Array

@@ -41,10 +41,10 @@ class Localiser(Protocol):
     """
 
     def fit(self, inputs: Array, places: Array) -> None:
-        """Learn from inputs (N, d) and positions `places` (N, 3) m, root frame; everything learned before is discarded."""
+        """Learn from inputs (N, 13) and positions `places` (N, 3) m, root frame; everything learned before is discarded."""
 
     def predict(self, inputs: Array) -> Array:
-        """Return the predicted positions (M, 3) m, root frame, for inputs (M, d)."""
+        """Return the predicted positions (M, 3) m, root frame, for inputs (M, 13)."""
 
 
 def eye_features(inputs: Array, lens: Lens) -> Array:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Teaches a simulated robot: the teacher carries the ball from place to place, and the learner looks at it from random postures."""
+"""Teaches a simulated robot to locate a ball: another robot carries it from place to place; the learner sees it from random postures."""
 
 from __future__ import annotations
 
@@ -32,10 +32,11 @@ def watch_teacher(
 ) -> list[Lesson]:
     """Move the teacher through postures (K, n) rad; at each, look at the ball from several postures of the learner; return the lessons.
 
-    The teacher is a robot that carries a ball; the learner is a robot with cameras that learns to locate it. All motions are controlled by
-    the control law, which keeps the robots apart. The teacher reports the position of the ball by its own encoders. If a picture shows
-    several balls, the largest one is used. There is no lesson if a picture shows no ball, or if the ball in one picture is more than 1.35
-    times as large as in the other. A posture that the teacher does not reach is skipped.
+    The teacher is a robot that carries a ball; the learner is a robot with cameras that learns to locate it. A lesson is one observation of
+    the ball in the pictures of both cameras, with the position that the teacher reports by its own encoders. All motions are controlled by
+    the control law, which keeps the robots apart. If a picture shows several balls, the largest one is used. There is no lesson if a
+    picture shows no ball, or if the ball in one picture is more than 1.35 times as large as in the other. A posture that the teacher does
+    not reach is skipped.
 
     Args:
         watcher: the simulated robots, with an object "ball" in their world.

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Chooses postures of the teacher, which bring the ball to places in a volume, and of the learner, whose cameras then see the ball."""
+"""Chooses postures of the teacher (the robot that carries the ball) and of the learner (the robot whose cameras see it).
+
+The teacher's postures bring the ball to places in a volume; in the learner's postures the ball is in the pictures of its cameras.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +28,7 @@ LIMIT = 0.2  # rad, of the teacher from its limits, which push within 10 degrees
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Carried:
-    """A ball that a robot carries.
+    """A ball that the teacher, one of two robots, carries.
 
     `link`: name of the link to which the ball is fixed, in the model of both robots together. `position`: (3,) m, middle of the ball in the
     root frame at the zero pose.
@@ -35,7 +38,10 @@ class Carried:
     position: Array
 
     def place(self, rig: Rig, transforms: Array) -> Array:
-        """Return the position of the ball (..., 3) m, root frame, for transforms of all links (..., L, 4, 4)."""
+        """Return the position of the ball (..., 3) m, root frame, in poses of the robots.
+
+        `rig`: both robots as one model. `transforms`: (..., L, 4, 4) of all links, from the zero pose to each pose, root frame.
+        """
         link = transforms[..., rig.robot.links.index(self.link), :3, :]
         found: Array = link[..., :3] @ self.position + link[..., 3]
         return found
@@ -44,10 +50,10 @@ class Carried:
 def teacher_postures(rig: Rig, model: Model, carried: Carried, rest: Array, volume: tuple[Array, Array], count: int, seed: int) -> Array:
     """Return postures (count, n) rad in which the teacher, the robot that carries the ball, holds the ball within a volume.
 
-    A posture has the positions of all n motors of both robots; in no posture are solids in contact.
+    A posture has the positions of all n motors of both robots, teacher and learner; in no posture are solids in contact.
 
     Args:
-        rig: both robots as one model, with the cameras.
+        rig: both robots as one model, with the learner's cameras.
         model: the robots in their world, for the contacts.
         carried: the ball.
         rest: (n,) rad, positions of all motors. A motor that does not move the ball keeps its position; the other values are not used.
@@ -80,12 +86,13 @@ def teacher_postures(rig: Rig, model: Model, carried: Carried, rest: Array, volu
 def gaze_postures(
     rig: Rig, model: Model, carried: Carried, posture: Array, share: float, size: tuple[int, int], count: int, rng: np.random.Generator
 ) -> Array:
-    """Return postures (K, n) rad, K <= count, in which both cameras of the model see the ball, without contacts.
+    """Return postures (K, n) rad, K <= count, in which both cameras of the learner see the ball and no solids are in contact.
 
-    The postures of torso and head are drawn at random; then the head is turned to the ball.
+    The teacher carries the ball; the learner is the other robot. The cameras are assumed to be where the model has them. The postures of
+    the learner's torso and head are drawn at random; then the head is turned to the ball.
 
     Args:
-        rig: both robots as one model, with the cameras.
+        rig: both robots as one model, with the learner's cameras.
         model: the robots in their world, for the contacts.
         carried: the ball.
         posture: (n,) rad, positions of all motors. All motors except torso and head keep them; the values of torso and head are not used.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The covariance function of the Gaussian process over reaches, and the fit of its parameters.
+"""The covariance function of the Gaussian process over reaches (pulls of the hand towards a target), and the fit of its parameters.
 
 The covariance of the mean rewards of two reaches has four parts: for similar poses and near targets ("place"), for similar poses and
 similar vectors from hand to target ("approach"), for similar remaining distances in any poses ("distance"), and a small part for all
@@ -68,7 +68,8 @@ def default_parameters(reaches: Reaches) -> Array:
 def joint_squares(reaches: Reaches) -> Array:
     """Return for each joint the squared differences between the samples of all pairs of states, shape (d, S, S).
 
-    Before that, the samples of each joint are divided by their spread (largest minus smallest).
+    The sample of a state is the pose of the d joints at which its reaches begin. The positions of each joint are first divided by their
+    spread (largest minus smallest).
     """
     scaled = (reaches.samples / np.maximum(np.ptp(reaches.samples, axis=0), 1e-9)).T
     squares: Array = (scaled[:, :, None] - scaled[:, None, :]) ** 2
@@ -79,7 +80,7 @@ class Covariance:
     """The covariance function of the mean rewards of reaches, for given parameters.
 
     Args:
-        squares: (d, S, S) squared differences of the samples, from `joint_squares`.
+        squares: (d, S, S) scaled squared differences of d joints between S states, from `joint_squares`.
         logs: (8 + d,) logarithms of the parameters, in the order of `default_parameters`.
     """
 
@@ -169,8 +170,8 @@ MAX_STEPS = 40  # of the search
 def fitted_pairs(reached: Reached) -> Ints:
     """Return the indices, ascending, of the pairs of state and target that a fit uses: at most MAX_FITTED (500).
 
-    Pairs of the newest world are taken first; the other worlds get what is left of the number. From a group with too many pairs, pairs at
-    equal distances in the order of their first tries are taken.
+    Pairs of the newest world are chosen first; pairs of all other worlds fill the remaining number. If one of these two groups has too many
+    pairs, evenly spaced ones are chosen from it, in the order of their first reaches.
     """
     newest = reached.world == reached.world.max(initial=0)
     chosen: list[Ints] = []
@@ -192,10 +193,10 @@ def negative_log_posterior(
     Args:
         logs: (8 + d,) logarithms of the parameters.
         arm: gives the features of the reaches.
-        squares: (d, S, S), from `joint_squares`.
+        squares: (d, S, S) scaled squared differences of d joints between S states, from `joint_squares`.
         reached: the n pairs of state and target that were tried, with their rewards.
         expected: (n,) prior mean reward of each pair.
-        factors: (W,) of the differences of the worlds, see `worlds.scales_of`.
+        factors: (W,) how much each world differs from the present one, see `worlds.scales_of`.
     """
     from scipy.linalg import cho_factor, cho_solve
 
@@ -219,9 +220,9 @@ def negative_log_posterior(
 def fitted_parameters(logs: Array, arm: LinearArm, squares: Array, reached: Reached, expected: Array, factors: Array = ONE_WORLD) -> Array:
     """Return the logarithms of the covariance parameters with the highest posterior, (8 + d,), by a local search.
 
-    `logs`: (8 + d,), where the search begins. `arm`: gives the features of the reaches. `squares`: (d, S, S), from `joint_squares`.
-    `reached`: the n pairs of state and target that were tried, with their rewards. `expected`: (n,) prior mean reward of each pair.
-    `factors`: (W,) of the differences of the worlds, see `worlds.scales_of`.
+    `logs`: (8 + d,), where the search begins, for d joints. `arm`: gives the features of the reaches. `squares`: (d, S, S), from
+    `joint_squares`. `reached`: the n pairs of state and target that were tried, with their rewards. `expected`: (n,) prior mean reward of
+    each pair. `factors`: (W,) how much each world differs from the present one, see `worlds.scales_of`.
     """
     from scipy.optimize import minimize
 

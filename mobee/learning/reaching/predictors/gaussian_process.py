@@ -33,10 +33,10 @@ MAX_CACHE = 300e6  # bytes of rows and covariances of queried targets, of one ta
 
 
 class Query:
-    """The cache of one target for which predictions were asked: intermediate results of Gaussian process regression, and the prediction.
+    """The cached results of Gaussian process regression for one target: intermediate results, and the prediction.
 
-    Arguments: `at`: the features of the reaches from all S states for this target. `prior`: (S, S), the covariance of their rewards before
-    any reach. `rows`: number of rows to reserve.
+    Arguments: `at`: inputs of the covariance function, for the reaches from all S states for this target. `prior`: (S, S), the covariance
+    of their rewards before any reach. `rows`: number of rows to reserve.
 
     Attributes: `rows`: an array with a row for each observed reach and S columns: the inverse of the Cholesky factor times the covariance
     of observed reaches and states. `upto`: number of rows that are computed. `mean` (S,), a difference from the prior mean, and
@@ -55,7 +55,7 @@ class Posterior:
     """The posterior of a Gaussian process: mean and covariance of the rewards of reaches from all states for any target.
 
     Args:
-        arm: gives the prior mean.
+        arm: the linear model of the arm that computes the prior mean of the rewards.
         covariance: the covariance function of the mean rewards.
         state: (n,) state of each pair of state and target that was tried so far.
         target: (n, 3) m, root frame, target of each pair.
@@ -174,7 +174,7 @@ class GaussianProcess:
     30 ms; a repeated one takes less than a millisecond.
 
     Args:
-        reaches: the reach actions: the marker's position in each state.
+        reaches: the reach actions, one for each state, with the marker's position in the state.
         refits: the parameters of the covariance are fitted again when the total number of reaches is one of these numbers.
     """
 
@@ -210,7 +210,7 @@ class GaussianProcess:
     def begin_world(self) -> None:
         """Predict from now on for another world or another robot, in which all later reaches are made.
 
-        Rewards of earlier worlds still inform. Their influence depends on how much they differ from later rewards: the variance of the
+        Rewards of earlier worlds still influence the predictions: the more they differ from later rewards, the less. The variance of the
         differences is estimated after 1, 2, 3, 4, 5, 6, 8, ... reaches in the present world.
         """
         self._factors = np.append(self._factors, 0.0)
@@ -274,9 +274,9 @@ class GaussianProcess:
 def thinned(known: Reached, most: int) -> tuple[Ints, Array, Array, Array, Ints]:
     """Return state (n,), target (n, 3) m, average reward (n,), number of tries (n,) and world (n,) of the pairs of state and target.
 
-    If there are more than `most` pairs, those of the same state whose targets lie in the same cell of a cubic grid are merged into one pair
-    with the average target and reward, weighted by the number of tries. The grid is made coarser until at most `most` pairs remain, or all
-    targets of each state are merged; so at least one pair of each state remains.
+    If there are more than `most` pairs, those of the same state and world whose targets lie in the same cell of a cubic grid are merged
+    into one pair with the average target and reward, weighted by the number of tries. The cells grow until at most `most` pairs remain, or
+    the largest cell (10 m) is reached; so at least one pair of each state and world remains.
     """
     state, world, raster, step = known.state, known.world, *RASTER
     which = np.arange(len(known))

@@ -21,13 +21,14 @@ MAX_LEFT_OUT = 400  # pairs that are predicted from all others
 
 
 class Kernel(Independent):
-    """Predicts rewards by averages with Gaussian weights over poses and targets.
+    """Predicts the rewards of reaches by averages of observed rewards, with Gaussian weights over poses and targets.
 
-    Where few reaches are near, the prediction is close to the prior mean.
+    If few reaches were observed with a similar pose and target, the prediction is close to the prior mean.
 
     Args:
-        reaches: the reach actions: the marker's position in each state.
-        prior: the prior mean: True: the reward expected from the distance between hand and target; False: the average of all rewards.
+        reaches: the pose at which the reach of each state begins, and the marker's position in it.
+        prior: the prior mean: True: the reward expected from the distance between hand and target; False: the average of the rewards of all
+            pairs of state and target, with four imagined pairs.
     """
 
     def __init__(self, reaches: Reaches, prior: bool = False) -> None:
@@ -41,7 +42,7 @@ class Kernel(Independent):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The name of the predictor, as JSON values."""
+        """A dict with the name of the predictor, {"name": "kernel_prior"} with `prior`, else {"name": "kernel"}."""
         return {"name": "kernel_prior" if self._prior else "kernel"}
 
     @property

@@ -19,13 +19,15 @@ PRIOR_WEIGHT = 1.0  # of slope 1 in the fit of the linear function, in reaches
 
 
 class LinearArm:
-    """Predicts rewards by a linear arm with springs: reward = offset + slope * the reward of the distance that remains with this arm.
+    """Predicts the reward of a reach from the distance that remains with a linear arm with springs.
+
+    The expected reward is offset + slope / (1 + distance / scale), where `scale` is that of the reaches (thesis eq. 8.4).
 
     Args:
         reaches: the reach actions: the marker's position and Jacobian in each state. Without Jacobians the arm does not move, and the whole
             distance remains.
         compliance: g of the springs, in rad/m^2.
-        offset, slope: of the linear function from the arm's rewards to the expected rewards.
+        offset, slope: of the expected reward, see above.
     """
 
     def __init__(self, reaches: Reaches, compliance: float = DEFAULT_COMPLIANCE, offset: float = 0.0, slope: float = 1.0) -> None:

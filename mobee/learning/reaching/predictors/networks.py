@@ -20,12 +20,12 @@ LENGTH_SCALE = 0.1  # m, unit of vectors and positions in the inputs
 class Networks:
     """Predicts rewards by five neural networks with two hidden layers of 32 units; their disagreement is the uncertainty.
 
-    The inputs are the joints, the target, and the vector from hand to target with its length. Each network counts each reach a random
-    number of times, drawn from a Poisson distribution (online bootstrap). Unlike with the other predictors, the order of the reaches
+    The inputs are the joint positions, the target, and the vector from hand to target with its length. Each network counts each reach a
+    random number of times, drawn from a Poisson distribution (online bootstrap). Unlike with the other predictors, the order of the reaches
     matters.
 
     Args:
-        reaches: the reach actions: the marker's position in each state.
+        reaches: the reach actions, one for each state: joint positions and position of the hand's marker at which it begins.
         seed: seed of the first weights and of all random choices during learning.
     """
 
@@ -72,12 +72,12 @@ class Networks:
         return mean
 
     def deviation(self, target: Array) -> Array:
-        """Return the standard deviation of the networks' predictions of a reach from each state for a target (3,) m, shape (S,)."""
+        """Return the standard deviation between the networks' predicted rewards of a reach from each state for a target (3,) m, (S,)."""
         deviation: Array = self._each(target).std(axis=0, ddof=1)
         return deviation
 
     def sample(self, target: Array, rng: np.random.Generator) -> Array:
-        """Return the predictions of one network, drawn at random, for a target (3,) m, shape (S,)."""
+        """Return the rewards that one network, drawn at random, predicts for a reach from each state to a target (3,) m, shape (S,)."""
         drawn: Array = self._each(target)[rng.integers(NETWORKS)]
         return drawn
 

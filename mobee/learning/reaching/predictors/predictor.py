@@ -39,9 +39,9 @@ class RewardPredictor(Protocol):
         ...
 
     def sample(self, target: Array, rng: np.random.Generator) -> Array:
-        """Return a random sample of the rewards of a reach from each state for a target (3,) m, shape (S,).
+        """Return a random sample, from the predictor's distribution, of the mean reward of a reach from each state, shape (S,).
 
-        Raises InvalidValue if the predictor has no distribution.
+        `target`: (3,) m. Raises InvalidValue if the predictor has no distribution.
         """
         ...
 
@@ -53,7 +53,7 @@ class RewardPredictor(Protocol):
 
 @runtime_checkable
 class WorldComparer(Protocol):
-    """Further interface of a predictor that estimates how far rewards from another world hold in the present one."""
+    """Additional interface of a predictor that estimates to what degree rewards from another world are valid in the present one."""
 
     def begin_world(self) -> None:
         """Predict from now on for another world or another robot, in which all later reaches are made."""
@@ -81,7 +81,7 @@ def lengths(reaches: Reaches, target: Array) -> Array:
 
 
 class DistancePrior:
-    """The expected reward as a function of the distance between hand and target, fitted to all reaches in `known`.
+    """The expected reward as a function of the distance between hand and target, fitted to all reaches that were observed (`known`).
 
     It is linear between KNOTS (every 5 cm up to 0.6 m), and constant beyond the last of them.
     """

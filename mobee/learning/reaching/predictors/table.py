@@ -15,13 +15,13 @@ NOISE = 0.05  # standard deviation of a reward around its mean, before there are
 
 
 class Table(Independent):
-    """Predicts a weighted mean of two averages: that of the rewards with the same state and target, and that of all such pairs.
+    """Predicts the reward of a reach as a weighted mean of the mean reward of its pair (state, target) and the average over all pairs.
 
-    The fewer rewards a pair has, the more weight the average of all pairs has. The model: the mean rewards of pairs are normally
-    distributed around the average of all pairs, and the rewards of a pair around its mean reward.
+    The fewer rewards a pair has, the more weight the average over all pairs has. The model: the mean rewards of pairs are normally
+    distributed around this average, and the rewards of a pair around its mean reward.
 
     Args:
-        reaches: the reach actions, one for each state.
+        reaches: the reach actions, one for each state; only their number is used.
     """
 
     def __init__(self, reaches: Reaches) -> None:
@@ -30,7 +30,7 @@ class Table(Independent):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The name of the predictor, as JSON values."""
+        """A dict with one key, "name": the name of the predictor."""
         return {"name": "table"}
 
     def _posterior(self, target: Array) -> tuple[Array, Array]:

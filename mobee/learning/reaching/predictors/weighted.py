@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The published predictor: the average of a state's rewards, weighted by the distance between targets (thesis eq. 8.5)."""
+"""The published predictor of the reward of a reach (a motion in which a force pulls the hand to a target).
+
+It is the average of the rewards of earlier reaches from the same state, weighted by the distance between targets (thesis eq. 8.5).
+"""
 
 from __future__ import annotations
 
@@ -18,13 +21,13 @@ _NO_DEVIATION = (
 
 
 class Weighted:
-    """The predictor of the thesis: for each state an average of its rewards, in which nearer targets have more weight.
+    """The predictor of the thesis: for each state, the average reward of the reaches from it, in which nearer targets have more weight.
 
     It is optimistic, because each average includes an imagined reward of 1: the prediction is 1 for a state that was never tried, and
     nearly 1 for targets far from those that were tried.
 
     Args:
-        reaches: the reach actions: their number, and the unit of distances.
+        reaches: the reach actions, one for each state; only their number and `scale`, the unit of distances [m], are used.
     """
 
     def __init__(self, reaches: Reaches) -> None:

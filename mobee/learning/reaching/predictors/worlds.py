@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rewards from several worlds or robots: how similar they are is estimated from the rewards.
+"""Rewards of reaches in several worlds or on several robots: the similarity of the worlds is estimated from the rewards.
 
-The mean reward of a reach in an earlier world, or on another robot such as a simulated one, is that in the present world plus a difference.
-The differences of one world are a Gaussian process whose covariance function is that of the mean rewards, times a factor d. The differences
-of two worlds are independent. So the covariance of the mean rewards of two reaches is K in general, and (1 + d) K if both were made in the
-same earlier world. With d = 0 the rewards of that world count like those of the present one; the larger d, the less they inform.
+A reach pulls the hand towards a target. Its mean reward in an earlier world, or on another robot such as a simulated one, is its mean
+reward in the present world plus a difference. The differences of one world are a Gaussian process whose covariance function is that of the
+mean rewards, times a factor d. The differences of two worlds are independent. So the covariance of the mean rewards of two reaches is K in
+general, and (1 + d) K if both were made in the same earlier world. With d = 0 the rewards of that world count like those of the present
+one; the larger d is, the less the rewards of that world inform about the present one.
 (Kennedy and O'Hagan 2000 model fast and accurate simulations like this, with another covariance function of the differences.)
 """
 
@@ -22,14 +23,17 @@ FACTORS = (0.0, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # values of d, equally pr
 def scales_of(world: Ints, factors: Array) -> Array:
     """Return the numbers (n, n) by which the covariances K of the mean rewards of n reaches are multiplied.
 
-    `world`: (n,) the index of the world of each reach. `factors`: (W,) d of each world; 0 for the present one.
+    `world`: (n,) the index of the world of each reach. `factors`: (W,) for each world the factor d of its differences from the present
+    world, see the module; 0 for the present one.
     """
     scales: Array = 1.0 + factors[world] * (world[:, None] == world)
     return scales
 
 
 def fitted_factors(between: Array, noise: Array, residual: Array, world: Ints, factors: Array) -> Array:
-    """Return the factors d (W,) with the largest evidence (marginal likelihood) of the rewards, by a local search over FACTORS.
+    """Return the factors (W,) with the largest evidence (marginal likelihood) of the rewards, by a local search over FACTORS.
+
+    A factor d describes how much a world differs from the present one, see the module.
 
     Args:
         between: (n, n) covariances K of the mean rewards of n pairs of state and target.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Detects things by a network that was trained on rendered pictures of them."""
+"""Detects things (objects of known shape, size and colour) by a network that was trained on rendered pictures of them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ FAINT = 0.1  # share below which a pixel counts as without the thing
 
 
 def by_network(network: Network, things: Sequence[Thing]) -> Detector:
-    """Return a detector that finds the given things with a network; the things must be among those of the network."""
+    """Return a detector that finds the given things with a network; the network must have been trained for these things."""
     shares = network.shares()
     names = [one.name for one in network.things]
     numbers = [names.index(one.name) for one in things]

@@ -19,11 +19,11 @@ SQUARE = np.ones((3, 3), np.bool_)
 
 
 def sharpened(picture: Picture, shares: Floats) -> Floats:
-    """Return the shares (H, W) of each pixel that a thing covers, with sharper edges than the shares that a network computed.
+    """Return for each pixel the share of its area that a thing covers, (H, W), 0 to 1, with sharper edges than a network's `shares`.
 
     The network's shares are smooth at an edge. There, the colour of a pixel is a mixture of the colours inside and outside of the thing. So
-    the fraction of the inside colour in this mixture is returned as the share. `picture`: (H, W, 3). `shares`: (H, W), those of the
-    network, 0 to 1.
+    the fraction of the inside colour in this mixture is returned as the share. `picture`: (H, W, 3), bytes red, green, blue. `shares`:
+    (H, W), 0 to 1, computed by the network.
     """
     labels = label(shares >= 0.5, diagonal=True)
     found = shares.copy()

@@ -37,7 +37,7 @@ class Quality:
 def judge(detect: Detector, names: Sequence[str], pictures: Sequence[Labelled]) -> Quality:
     """Measure the quality of a detector on labelled pictures.
 
-    `names`: names of the things, in the order of the pictures' `shares`.
+    `names`: names of the N things, in the order of the last axis of `Labelled.shares` (H, W, N).
     """
     errors: dict[str, list[float]] = {name: [] for name in names}
     false, seconds = 0, 0.0

@@ -64,7 +64,7 @@ class Network:
     def shares(self) -> Shares:
         """Return a function that runs the network: it takes a picture (H, W, 3) and returns an array (N, H, W).
 
-        For each of N things and each pixel, this is the share of the pixel that the thing covers, 0 to 1.
+        An element of the array is the share of a pixel, 0 to 1, that one of the N things covers.
 
         Raises InvalidValue if OpenCV cannot read the network, and NotInstalled without OpenCV. The function raises InvalidValue if OpenCV
         cannot run the network.

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rendered pictures of things at random positions before a robot's cameras, with the share of each thing in each pixel."""
+"""Rendered pictures for training a detector: things (objects to be recognised) at random positions before a robot's cameras.
+
+Each picture has the share of each thing in each pixel.
+"""
 
 from __future__ import annotations
 
@@ -44,10 +47,11 @@ class Labelled:
 
 
 def labelled_pictures(robot: Robot, world: World, things: Sequence[Thing], count: int, seed: int) -> Iterator[Labelled]:
-    """Yield `count` pictures of imperfect cameras with random postures, positions of the things, rooms, clutter and brightness.
+    """Yield `count` pictures from the robot's cameras, with distortion and noise, each with random posture, positions and brightness.
 
-    A quarter of the objects in the room have colours of the things, and so has a quarter of the sheets of
-    paper on the world's boxes. `seed`: seed of all random draws. Raises InvalidValue if the robot has no camera.
+    `things`: the objects that vision has to recognise, all of them objects of `world`; they get random positions before the camera. The
+    background is a random room with decoration, and paper lies on the boxes of the world. About a quarter of the decoration and of the
+    papers have the colour of one of the things. `seed`: seed of all random draws. Raises InvalidValue if the robot has no camera.
     """
     cameras = cameras_of(robot)
     if not cameras:

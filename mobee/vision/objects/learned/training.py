@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Trains the network of a learned detector on rendered pictures.
 
-From the surroundings of a pixel the network learns, by least squares, the share of the pixel that each thing covers. So its output is the
-mean share over pixels with such surroundings. Pixels are drawn from the edges and the inside of things and from the rest of the picture.
-The network first learns from half of the pictures. Then it learns from all of them, and also from pixels at which it was wrong.
+The network learns, by least squares, to predict from the surroundings of a pixel which share of the pixel each thing (an object to be
+found) covers. Its output therefore estimates the mean share over all pixels that have the same surroundings. Pixels are drawn from the
+edges and the inside of things and from the rest of the picture. The network first learns from half of the pictures. Then it learns from all
+of them, and also from pixels at which it was wrong.
 """
 
 from __future__ import annotations
