@@ -82,8 +82,8 @@ class Subject:
 
     @cached_property
     def home(self) -> Array:
-        """The motor positions at home, (n,) rad; 0 for a home that is not a number."""
-        return np.nan_to_num(self.robot.home)
+        """The motor positions at home, (n,) rad; 0 for a home that is not finite."""
+        return np.nan_to_num(self.robot.home, nan=0.0, posinf=0.0, neginf=0.0)
 
     @cached_property
     def limited(self) -> Robot:

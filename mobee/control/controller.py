@@ -20,6 +20,7 @@ from mobee.control.stability import largest_step, require_stable
 from mobee.control.terms import State, Term, valid_terms
 from mobee.errors import InvalidValue, UnknownName
 from mobee.model.masses import gravity_torque
+from mobee.model.snapshot import MAX_HANDS
 from mobee.robot.motor_units import motor_units
 
 if TYPE_CHECKING:
@@ -299,17 +300,18 @@ class Controller:
     def step(self, q: Array, dt: float, forces: Forces | None = None, pose: Pose | None = None) -> Command:
         """Advance the control law by dt [s] from the measured q (n,) rad and return the command (thesis eq. 5.7).
 
-        `forces`: the constraint forces at q; None: computed from `pose`, the robot at q; without a pose the model evaluates q. Forces that
-        depend on the law's state, and those of the user-defined terms, are computed if `forces` does not contain them. Forces of the client
-        and of reaches are added. Raises InvalidValue for a dt at which the law is unstable (`max_dt` or more), for a q that is not finite,
-        and for forces that are not finite or whose sum is above LARGEST_FORCE (1e9 rad/s^2).
+        `forces`: the constraint forces at q; None: computed from `pose`, the robot at q. Without a pose the model evaluates q, and contacts
+        of the hands of the first two reaches with targets are ignored. Forces that depend on the law's state, and those of the user-defined
+        terms, are computed if `forces` does not contain them. Forces of the client and of reaches are added. Raises InvalidValue for a dt
+        at which the law is unstable (`max_dt` or more), for a q that is not finite, and for forces that are not finite or whose sum is
+        above LARGEST_FORCE (1e9 rad/s^2).
         """
         if not 0 < dt < self.max_dt:
             require_stable(self.robot, self.gains, dt)
         n = len(self._attractor)
         q = checked("q", q, n)
         if forces is None:
-            pose = self._track.evaluate(q) if pose is None else pose
+            pose = self._evaluated(q) if pose is None else pose
             forces = self.forces(pose)
         if not all(name in forces for name in self.force_names):
             forces = self._filled(forces, q, dt, pose)
@@ -324,10 +326,14 @@ class Controller:
 
     def _filled(self, forces: Forces, q: Array, dt: float, pose: Pose | None) -> Forces:
         """Return the given forces, completed by the forces of `terms` and those that depend on the law's state."""
-        more = self.own_forces(q, dt, pose)
+        more = self.own_forces(q, dt, pose, self._reaches.markers[:MAX_HANDS])
         if any(name not in forces for name in state_term_names()):
-            more |= self.forces(self._track.evaluate(q) if pose is None else pose)
+            more |= self.forces(self._evaluated(q) if pose is None else pose)
         return Forces(**{**more, **forces})
+
+    def _evaluated(self, q: Array) -> Pose:
+        """Return the pose at q, without contacts of the hands that reach with targets."""
+        return self._track.evaluate(q, self._reaches.markers[:MAX_HANDS])
 
     def _add_client(self, q: Array, total: Array) -> None:
         """Add f_config and f_work (thesis eqs. 5.9 and 5.10); for a motor that slides f_work is converted to its unit, as for a contact."""

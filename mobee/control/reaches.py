@@ -78,6 +78,11 @@ class Reaches:
     def __getitem__(self, part: str | None) -> Reaching:
         return self._under_way[part]
 
+    @property
+    def markers(self) -> tuple[str, ...]:
+        """The names of the markers that are pulled at present, without repetition."""
+        return tuple(dict.fromkeys(reaching.marker for reaching in self._under_way.values()))
+
     def begin(self, part: str | None, marker: str) -> None:
         """Begin a reach of a part (None: of the whole body): a force that will pull a marker. It has no target yet (see `Reaching.aim`).
 

@@ -21,17 +21,16 @@ TURN = 2.0 * np.pi
 
 
 def bounded(robot: Robot) -> tuple[Robot, list[str]]:
-    """Limit every motor with a range of more than a turn to one turn; return the robot and the names of the changed motors.
+    """Limit every motor that can turn a joint by more than a turn to one turn; return the robot and the names of the changed motors.
 
     With a larger range, positions one turn apart are the same pose, so that several states of a lattice would be the same pose. For a motor
     that drives joints with other scales than 1, the turn is that of the joint that moves most. The middle of the new range is 0, or home if
     home is more than half a turn from 0. If the new range would exceed the old limits, it is shifted into them.
     """
-    changed = [motor.name for motor in robot.motor_table if np.ptp(motor.limits) >= TURN - 1e-6 and not slides(robot, motor)]
     table = []
     for motor in robot.motor_table:
-        if motor.name in changed:
-            scale = max(abs(scale) for _, scale, _ in motor.joints)
+        scale = max((abs(scale) for _, scale, _ in motor.joints), default=1.0)
+        if np.ptp(motor.limits) * scale >= TURN - 1e-6 and not slides(robot, motor):
             centre = motor.home if abs(motor.home) > np.pi / scale else 0.0
             low, high = motor.limits
             centre = float(np.clip(centre, low + np.pi / scale, max(high - np.pi / scale, low + np.pi / scale)))

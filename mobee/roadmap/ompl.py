@@ -17,6 +17,7 @@ from mobee.roadmap.ik.problem import chosen, solid_model
 
 EXTENSIONS = 3000  # number of extensions of the trees after which a search is given up
 RANGE = 0.25  # of the ranges, the longest extension
+INVALID = 10_000  # number of invalid samples, one after the other, after which a roadmap is given up
 
 
 class OmplMissing(MobeeError):
@@ -161,6 +162,7 @@ def grown(
 
     Raises:
         OmplMissing: OMPL is not installed.
+        MobeeError: no valid pose was found in INVALID (10 000) samples.
     """
     base, geometric, util = require_ompl()
     util.setLogLevel(util.LOG_ERROR)
@@ -169,10 +171,15 @@ def grown(
     corner, high = (checker.box[:, 0] - low) / span, np.ptp(checker.box, axis=1) / span
     space = _space(base, corner, corner + high)
 
+    invalid = 0
+
     def sample(self: Any, state: Any) -> bool:
+        nonlocal invalid
         for joint, drawn in enumerate(corner + rng.uniform(size=len(low)) * high):
             state[joint] = float(drawn)
-        return bool(checker.sound(_pose(checker, state)[None])[0])
+        is_valid = bool(checker.sound(_pose(checker, state)[None])[0])
+        invalid = 0 if is_valid else invalid + 1
+        return is_valid
 
     information = _information(base, space, checker)
     # OMPL's own sampler ignores every seed except the first one of a process.
@@ -188,7 +195,9 @@ def grown(
         planner.setMaxNearestNeighbors(neighbours)
     planner.setProblemDefinition(base.ProblemDefinition(information))
     planner.setup()
-    planner.growRoadmapPtc(base.PlannerTerminationCondition(lambda: planner.milestoneCount() >= milestones))
+    planner.growRoadmapPtc(base.PlannerTerminationCondition(lambda: planner.milestoneCount() >= milestones or invalid >= INVALID))
+    if invalid >= INVALID:
+        raise MobeeError(f"{INVALID} random poses, one after the other, are not valid: change the world, the fixed motors or the limits.")
     data = base.PlannerData(information)
     planner.getPlannerData(data)
     vertices = np.array([_pose(checker, data.getVertex(v).getState()) for v in range(data.numVertices())])

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -55,9 +55,9 @@ def nearest_posture(model: Model, part: str, marker: str, position: Array, q: Ar
 def body_at(model: Model, part: str, position: Array, q: Array) -> str | None:
     """Return the name of a link whose solid shapes contain `position` (3,) m, root frame, in the posture q (n,) rad; None if there is none.
 
-    Links that the part moves are ignored, and so are the shapes `Robot.base_shapes`, which are never tested against world objects.
+    Links that the part moves are ignored.
     """
-    robot, world = model.robot, World()
+    robot, world = replace(model.robot, base_shapes=frozenset()), World()  # those shapes are tested too
     world.add("place", sphere(POINT), position=position)
     table = Model(robot, world).evaluate(q).table
     moved = links_moved(robot)[part]

@@ -208,6 +208,13 @@ class ReachesUnderWay:
         """
         return self._settled.pop(part, None)
 
+    def restart(self) -> None:
+        """Cancel all reaches and forget the outcomes of earlier ones; the target stays."""
+        for part in tuple(self._under_way):
+            self.drop(part)
+        self._settled.clear()
+        self._ended.clear()
+
     def drop(self, part: str) -> None:
         """Cancel the reach of a part, if there is one: end its force, and discard an outcome that `after` has not returned yet."""
         self._settled.pop(part, None)

@@ -151,8 +151,7 @@ class OfflinePlant:
         """
         start = self._checked_start(q)
         self.motors.restart(seed, start)
-        for part in self.robot.parts:
-            self._reaches.drop(part)
+        self._reaches.restart()
         self._actions.end_all()
         self._controller.clear()
         self._controller.reset(start)

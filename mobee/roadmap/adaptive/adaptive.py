@@ -93,7 +93,8 @@ class AdaptiveRoadmap:
         """
         here = int(target_states(self.space, start)[0])
         targets = set(target_states(self.space, goals).tolist())
-        left, edges = self.costs(goals), self._edge_costs()
+        left, onward = self._search(goals)
+        edges = self._edge_costs()
         if not np.isfinite(left[here]):
             raise MobeeError(
                 f"the map has no path from vertex {here} to {sorted(targets)}, because edges that failed were removed. "
@@ -102,8 +103,9 @@ class AdaptiveRoadmap:
         path = [here]
         while path[-1] not in targets:
             row = self.space.goals[path[-1]]
-            onward = np.where(np.isfinite(edges[path[-1]]), edges[path[-1]] + left[row], np.inf)
-            path.append(int(row[onward.argmin()]))
+            following = int(row[np.where(np.isfinite(edges[path[-1]]), edges[path[-1]] + left[row], np.inf).argmin()])
+            # Edges between equal poses cost nothing: the cheapest could lead back and forth. The search's own tree has no circle.
+            path.append(following if left[following] < left[path[-1]] else int(onward[path[-1]]))
         return tuple(path)
 
     def costs(self, goals: ArrayLike) -> Array:
@@ -112,15 +114,7 @@ class AdaptiveRoadmap:
         The cost of an edge is its length [rad] divided by its probability of success. The cost of a vertex from which no path is left is
         infinite.
         """
-        from scipy.sparse import csr_array
-        from scipy.sparse.csgraph import dijkstra
-
-        edges = self._edge_costs()
-        states, actions = np.nonzero(np.isfinite(edges))
-        reverse = (self.space.goals[states, actions], states)
-        graph = csr_array((edges[states, actions], reverse), shape=(len(self), len(self)))
-        found: Array = dijkstra(graph, indices=target_states(self.space, goals), min_only=True)
-        return found
+        return self._search(goals)[0]
 
     def reward(self, goals: ArrayLike) -> Array:
         """Return the reward (S, A) for which value iteration finds the paths of `plan` to the vertices `goals`.
@@ -154,9 +148,10 @@ class AdaptiveRoadmap:
         return int(rng.choice(len(self), p=untried / total)) if total else None
 
     def observe(self, state: int, action: int, arrived: int) -> None:
-        """Record the end of a motion along the edge `action` of vertex `state`; `arrived`: the vertex where the motion ended.
+        """Record the end of a motion along the edge `action` of vertex `state`.
 
-        The try counts as a success if `arrived` is the goal of the edge, else as a failure.
+        `arrived`: the goal of the edge if the motion reached it, otherwise another vertex, for example `state`. The try counts as a success
+        if `arrived` is the goal of the edge, else as a failure.
         """
         goal = self.space.goal(state, action)
         self.beliefs.observe(state, action, arrived == goal)
@@ -220,6 +215,18 @@ class AdaptiveRoadmap:
             edges += sound or row or [(state, self._nearest(state, kept))]
         self._change(self.space.samples[kept], [(int(number[s]), int(number[g])) for s, g in edges], number)
         return number
+
+    def _search(self, goals: ArrayLike) -> tuple[Array, Ints]:
+        """Return the cost of the cheapest path from each vertex to one of the vertices `goals`, and the next vertex on this path, (S,)."""
+        from scipy.sparse import csr_array
+        from scipy.sparse.csgraph import dijkstra
+
+        edges = self._edge_costs()
+        states, actions = np.nonzero(np.isfinite(edges))
+        reverse = (self.space.goals[states, actions], states)
+        graph = csr_array((edges[states, actions], reverse), shape=(len(self), len(self)))
+        costs, following, _ = dijkstra(graph, indices=target_states(self.space, goals), min_only=True, return_predecessors=True)
+        return costs, following
 
     def _works(self, edges: Edges) -> list[bool]:
         found = (self.action(state, goal) for state, goal in edges)

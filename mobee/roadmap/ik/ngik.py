@@ -30,8 +30,8 @@ class IK:
 
     `q`: (n,) rad, the pose. `reached`: whether the residuals of all terms that have a tolerance are within it. `residuals`: residual of
     each term, by the term's name. `evaluations`: number of poses that the search evaluated. `table`: all contacts of the pose, also those
-    of fields (larger shapes that cause repulsive forces). The search computes contacts of solids only; for `reached`, `residuals` and
-    `table`, q is evaluated again with all contacts.
+    of fields (larger shapes that cause repulsive forces). As in the search, `reached` and `residuals` depend on contacts of solids only;
+    for `table`, q is evaluated again with all contacts.
     """
 
     q: Array
@@ -105,8 +105,8 @@ def _evolved(problem: Problem, rng: np.random.Generator, most: int) -> Array:
 
 
 def _result(model: Model, problem: Problem, q: Array) -> IK:
-    """Return the result for q, from a new evaluation with the whole model."""
-    pose = model.evaluate(q[None])
+    """Return the result for q: the costs from an evaluation with solids only, as in the search, and all contacts."""
+    pose = problem.model.evaluate(q[None])
     missing = {name: float(one.residual(pose)[0]) for name, one in problem.by_name.items()}
     reached = all(one.tolerance is None or missing[name] <= one.tolerance for name, one in problem.by_name.items())
-    return IK(q, reached, missing, problem.evaluations, pose.table)
+    return IK(q, reached, missing, problem.evaluations, model.evaluate(q[None]).table)

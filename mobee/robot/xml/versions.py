@@ -3,7 +3,7 @@
 
 | version attribute of the root | form |
 | --- | --- |
-| 2.0 | today's (robots/README.md) |
+| 2.0 | today's (mobee/robot/robots/README.md) |
 | 0.1 | MoBeE 0.1 |
 | 1.0, or none | the programs of 2010 to 2014; or MoBeE 0.1, which wrote 1.0 too, if the file has a tag or attribute that was new in 0.1 |
 

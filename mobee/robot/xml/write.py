@@ -25,7 +25,7 @@ DIGITS = 1e-14  # m; smaller values are rounding errors of a sum
 
 
 def write_xml(robot: Robot, path: str | Path) -> Path:
-    """Write a robot to a zero-position XML file (robots/README.md) and return its path.
+    """Write a robot to a zero-position XML file (mobee/robot/robots/README.md) and return its path.
 
     Reading the file gives the same kinematics, motors, parts (groups of motors), shapes, pairs of shapes that are tested for contacts,
     markers, masses, visuals, cameras and clauses (conditions on the positions of motors, `mobee.robot.robot.Clause`). The files of meshes

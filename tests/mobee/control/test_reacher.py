@@ -10,6 +10,7 @@ from mobee.arrays import Array
 from mobee.control import Controller, Gains
 from mobee.control.reach import Reacher, reach_path
 from mobee.errors import InvalidValue, UnknownName
+from mobee.model import World, sphere
 from mobee.model.model import Model
 from mobee.reach import ReachTarget
 from mobee.robot.load import load_robot
@@ -133,6 +134,18 @@ def test_it_is_the_controllers_reach_by_all_motors_that_move_the_marker() -> Non
     moved = {model.robot.motor_table[i].part for i in np.flatnonzero(velocity != at_rest)}
     assert moved == {"torso", "left_arm"}
     assert np.array_equal(reaching.attractor, q)
+
+
+def test_a_target_in_the_world_does_not_repel_the_hand_that_reaches_for_it() -> None:
+    robot = load_robot("icub")
+    world, position = World(), Model(robot).evaluate(robot.home).position("right_palm")
+    world.add("cup", sphere(0.03), position=position, role="target")
+    controller = Controller(Model(robot, world))
+    controller.step(robot.home, DT)
+    assert np.abs(controller.last_forces["collision"]).max() > 1.0
+    controller.reach_toward("right_arm", "right_palm", ReachTarget(position))
+    controller.step(robot.home, DT)
+    assert np.abs(controller.last_forces["collision"]).max() == 0.0
 
 
 def test_a_new_reacher_replaces_the_last_one() -> None:

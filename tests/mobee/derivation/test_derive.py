@@ -98,6 +98,16 @@ def test_a_joint_with_a_range_of_more_than_a_turn_gets_one_turn_of_it(
     assert derived.robot.limits == pytest.approx(np.tile(expected, (3, 1)))
 
 
+def test_a_motor_is_limited_if_a_joint_that_follows_it_turns_by_more_than_a_turn(tmp_path: Path) -> None:
+    path = tmp_path / "limbs.urdf"
+    urdf(tmp_path, limb("shoulder", 0.0, 0.3, 0.0))
+    first, second, third = path.read_text().rpartition('<limit lower="-1.5" upper="1.5"')
+    path.write_text(f'{first}<mimic joint="shoulder_joint0" multiplier="3"/>{second.replace("1.5", "9")}{third}')
+    derived = derive(load_robot(path))
+    assert derived.limited == ("shoulder_joint0",)
+    assert derived.robot.limits[derived.robot.motor_index("shoulder_joint0")] == pytest.approx([-np.pi / 3.0, np.pi / 3.0])
+
+
 def test_home_is_moved_out_of_contact(tmp_path: Path) -> None:
     robot = urdf(tmp_path, limb("left_shoulder", 0.0, 0.05, 0.2), limb("right_shoulder", 0.0, -0.05, 0.2))
     table = tuple(replace(motor, home=-0.5 if motor.name == "left_shoulder_joint0" else motor.home) for motor in robot.motor_table)

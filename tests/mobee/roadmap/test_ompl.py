@@ -41,6 +41,15 @@ def test_motors_that_may_not_move_stay_where_they_are():
     assert np.allclose(path[:, 1], 0.2)
 
 
+@pytest.mark.parametrize("planner", [prm, prm_star])
+def test_a_roadmap_of_a_robot_that_always_has_contacts_is_given_up(planner, monkeypatch):
+    monkeypatch.setattr("mobee.roadmap.ompl.INVALID", 200)
+    world = mobee.World()
+    world.add("block", mobee.box(2.0, 2.0, 0.2), position=(0.0, 0.0, 0.0))
+    with pytest.raises(mobee.MobeeError, match="200 random poses, one after the other, are not valid"):
+        planner(mobee.Model(planar_arm(), world), milestones=5)
+
+
 def test_without_a_path_the_result_is_none():
     world = mobee.World()
     world.add("wall", mobee.box(0.2, 0.2, 0.2), position=(0.4, 0.35, 0.0))

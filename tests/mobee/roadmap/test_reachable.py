@@ -8,6 +8,7 @@ import pytest
 
 from mobee import InvalidValue, Model, UnknownName, load_robot
 from mobee.roadmap.reachable import body_at, nearest_outside, nearest_posture
+from tests.mobee.planar import planar_arm
 
 ROBOT = load_robot("icub")
 MODEL = Model(ROBOT)
@@ -48,6 +49,13 @@ def test_a_place_in_the_body_is_known_by_the_link_that_is_there() -> None:
     assert body_at(MODEL, "left_arm", left, ROBOT.home) is None  # it can be taken away from there
     assert body_at(MODEL, "right_arm", np.array([0.0, 0.0, 0.1]), ROBOT.home) in ROBOT.links
     assert body_at(MODEL, "right_arm", np.array([-0.4, 0.3, 0.3]), ROBOT.home) is None
+
+
+def test_a_place_in_the_base_on_which_the_robot_stands_is_in_the_body() -> None:
+    model = Model(planar_arm())
+    post = model.robot.shapes[0]
+    assert model.robot.base_shapes == {0}
+    assert body_at(model, "arm", post.position, model.robot.home) == "base"
 
 
 def test_the_place_outside_the_body_is_free_near_and_can_be_come_to() -> None:

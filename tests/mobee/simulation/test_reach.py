@@ -50,6 +50,15 @@ def test_a_reach_is_drawn_to_the_target_and_back(gains: Gains) -> None:
     assert outcome is plant.reached("arm")
 
 
+def test_after_a_restart_no_reach_has_ended() -> None:
+    plant = bent()
+    plant.present(NEAR)
+    plant.reach("arm", "tip")
+    plant.restart(0)
+    with pytest.raises(InvalidValue, match="has not ended a reach"):
+        plant.reached("arm")
+
+
 @BOTH
 def test_with_stay_the_part_is_not_drawn_back(gains: Gains) -> None:
     plant = bent(gains=gains)

@@ -49,6 +49,13 @@ def test_a_failed_edge_is_excluded_and_another_path_is_planned_at_once():
         roadmap.plan(0, 1)
 
 
+def test_a_path_does_not_go_back_and_forth_between_vertices_with_equal_poses():
+    poses = SQUARE[[0, 0, 0, 1]]
+    ring = AdaptiveRoadmap(mobee.Space(ROBOT, JOINTS, poses, [[1, 2, -1], [0, -1, -1], [1, 0, 3], [2, -1, -1]]))
+    assert ring.plan(0, 3) == (0, 2, 3)
+    assert ring.plan(1, 3) == (1, 0, 2, 3)
+
+
 def test_an_observation_can_count_for_both_directions_of_an_edge():
     roadmap = square(both_ways=True)
     roadmap.observe(0, 0, 0)

@@ -95,6 +95,16 @@ def test_evolution_finds_a_pose_that_least_squares_misses(free: mobee.Model) -> 
     assert mobee.solve_ik(free, both, motors=ARM).reached
 
 
+def test_contacts_of_fields_do_not_count_in_plain_functions_either(icub: mobee.Robot) -> None:
+    world = mobee.World()
+    world.add("ball", mobee.sphere(0.02), position=mobee.Model(icub).evaluate(icub.home).position("right_palm") + [0.0, -0.05, 0.0])
+    model = mobee.Model(icub, world)
+    count = costs.term(lambda pose, contacts: len(contacts), tolerance=0.5, name="contacts")
+    ik = mobee.solve_ik(model, [count], motors=ARM)
+    assert model.evaluate(ik.q).table.kind.tolist().count(1) > 0  # fields
+    assert ik.reached and ik.residuals == {"contacts": 0.0}
+
+
 def test_an_unreachable_target_ends_with_the_nearest_pose(free: mobee.Model) -> None:
     far = [costs.position("right_palm", [-3.0, 0.0, 0.0])]
     ik = mobee.solve_ik(free, far, motors=ARM, method="nes", evaluations=2000)
