@@ -18,7 +18,7 @@ from mobee_cli.errors import UserError
 from services.common.exit_codes import BAD_INPUT, ENVIRONMENT, FAILED, OK
 from services.common.identity import KEYS, ROUTER, BadKeys, default_folder
 
-SERVICES = ("robot_sim", "renderer", "model", "controller", "port_filter", *BEHAVIOURS, "vision", "monitor", "recorder", "launcher")
+SERVICES = ("robot_sim", "renderer", "model", "controller", "port_filter", *BEHAVIOURS, "cup", "vision", "monitor", "recorder", "launcher")
 PERSONS = ("operator", "observer")
 _PARTS = ("head", "torso", "left_arm", "right_arm")  # of the iCub
 _DAYS = 365

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from mobee_cli.__main__ import main
+from services.launcher.scenario import read_scenario, shipped
 
 
 def test_keys_are_made_listed_added_and_renewed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -31,6 +32,15 @@ def test_keys_are_made_listed_added_and_renewed(tmp_path: Path, capsys: pytest.C
     assert rows["router"] == ("router", 99)
     assert main(["keys", "list", "--keys", str(folder)]) == 0
     assert max(map(len, capsys.readouterr().out.splitlines())) <= 80
+
+
+def test_new_keys_hold_an_identity_for_each_service_of_the_shipped_scenarios(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["keys", "new", str(tmp_path / "keys")]) == 0
+    capsys.readouterr()
+    assert main(["keys", "list", "--keys", str(tmp_path / "keys"), "--json"]) == 0
+    made = {row["name"] for row in json.loads(capsys.readouterr().out)}
+    needed = {part.who for name in shipped() for part in read_scenario(name).parts}
+    assert {"cup", "agent_torso", "robot_sim"} <= needed <= made
 
 
 @pytest.mark.parametrize(
