@@ -229,7 +229,7 @@ class Bus:
         now = time.monotonic()
         if now - self._reported.get(reason, -1.0) >= 1.0:
             self._reported[reason] = now
-            self.event("warning", "refused", text, reason=float(self.rejected[reason]))
+            self.event("warning", "refused", text, times=float(self.rejected[reason]))
 
     def guarded(self, what: str, handle: Callable[[], object]) -> None:
         """Run `handle`; if it raises an unexpected exception, count and log it, publish a warning, and let the process continue.

@@ -11,6 +11,7 @@ from bus_schema.rpc import Done, Empty
 from mobee import Model
 from mobee.arrays import Array
 from mobee.control.reflex import KINDS, Reflex, Violation, Watch
+from mobee.robot.motor_units import slides
 from mobee.robot.robot import Robot
 from services.common.lockstep import Barrier, Participant
 from services.common.service import CallRefused, Service
@@ -169,13 +170,10 @@ class FilterNode:
         self._driven = []
 
     def _where(self) -> str:
-        """Return a short description of the worst violation."""
+        """Return a short description of the deepest contact; if there is none, of the first violation."""
         recovery = self._switch.reflex.recovery
         worst = next(iter(self._switch.violations or (recovery.cause if recovery else ())), None)
-        if worst is None:
-            return "in violation"
-        size = f"{1e3 * worst.depth:.0f} mm deep" if worst.kind == "contact" else f"by {np.rad2deg(worst.depth):.1f} degrees"
-        return f"{worst.kind} {worst.what} {size}"
+        return "in violation" if worst is None else described(self._robot, worst)
 
     def _report(self, level: str, code: str, text: str, **values: float) -> None:
         for bus in (self._service.bus, self._twin.bus):
@@ -218,3 +216,12 @@ class FilterNode:
         text = f"{reflex.state}, {counts.reflexes} reflexes, {counts.recovered} recovered, {counts.stuck} stuck"
         numbers = {"reflexes": counts.reflexes, "recovered": counts.recovered, "stuck": counts.stuck, "flips": counts.flips}
         return text, {**numbers, "recorded": reflex.recorded, "refused": sum(self._twin.bus.rejected.values())}
+
+
+def described(robot: Robot, violation: Violation) -> str:
+    """Return a violation of a pose of the robot in a few words, such as "limit l_elbow by 3.0 degrees"."""
+    if violation.kind == "contact":
+        return f"contact {violation.what} {1e3 * violation.depth:.0f} mm deep"
+    is_slide = violation.kind == "limit" and slides(robot, robot.motor_table[robot.motor_index(violation.what)])
+    size = f"{1e3 * violation.depth:.1f} mm" if is_slide else f"{np.rad2deg(violation.depth):.1f} degrees"
+    return f"{violation.kind} {violation.what} by {size}"
