@@ -99,9 +99,8 @@ def _send(system: System, seed: int, count: int) -> Counter[str]:
     """Send `count` drawn messages, calls and tokens from several processes; return how many of each."""
     parts = json.dumps({name: len(part) for name, part in load_robot("icub").parts.items()})
     argv = [sys.executable, "-m", "mobee_system.run", "experiments.kit.live.malformed", system.endpoint]
-    senders = [
-        subprocess.Popen([*argv, str(seed + n), str(count // _SENDERS), parts], stdout=subprocess.PIPE, text=True) for n in range(_SENDERS)
-    ]
+    each = str(-(-count // _SENDERS))  # rounded up, so that the last ones are sent too
+    senders = [subprocess.Popen([*argv, str(seed + n), each, parts], stdout=subprocess.PIPE, text=True) for n in range(_SENDERS)]
     outputs = [sender.communicate()[0] for sender in senders]
     if codes := [sender.returncode for sender in senders if sender.returncode]:
         raise LaunchFailed(f"a process that sends has ended with code {codes[0]}")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Inverse kinematics of a palm among boxes: how often and how fast the library, mink and the thesis' rivals reach a target pose."""
+"""Inverse kinematics of a palm among boxes: how often and how fast the library, mink and other optimisers reach a target pose."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ REQUIREMENTS = (
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Numbers of targets: `targets` for torso and arm, `whole` for all 41 motors, `rivals` for each of the thesis' rivals."""
+    """Numbers of targets: `targets` for torso and arm, `whole` for all 41 motors, `rivals` for each optimiser in RIVALS."""
 
     targets: int = 300
     whole: int = 60
@@ -145,7 +145,7 @@ def targets(model: mobee.Model, count: int, seed: int = 0) -> list[Target]:
     `seed`: of the postures.
     """
     robot, rng = model.robot, np.random.default_rng(seed)
-    columns = [*range(robot.part("torso").start, len(robot.part("torso"))), *(robot.motor_index(name) for name in MOTORS[1:])]
+    columns = [robot.motor_index(name) for name in (*robot.part("torso").motors, *MOTORS[1:])]
     low, high = robot.limits[columns].T
     found: list[Target] = []
     while len(found) < count:
@@ -177,7 +177,7 @@ def library(model: mobee.Model, method: Literal["hybrid", "nes"], motors: Motors
 
 
 def rival(model: mobee.Model, name: str, motors: Motors) -> Solve:
-    """Return one of the thesis' rivals as a solver.  `name`: a key of RIVALS.
+    """Return one of the optimisers with which the thesis compares NES (rivals) as a solver.  `name`: a key of RIVALS.
 
     A solver is called with a target and a seed, and returns whether it found a pose and how many poses it evaluated.  `motors`: names of
     the motors that may move; None: all.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Starts the port filter: `python -m services.port_filter`."""
+"""Starts the port filter, which moves the robot back if a client moves it into contact: `python -m services.port_filter`."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Settings of the port filter."""
+"""Settings of the port filter, the process that moves the robot back if a client moves it into contact."""
 
 from __future__ import annotations
 

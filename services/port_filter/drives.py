@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Answers the calls of the filter's clients, and forwards calls, metadata, emergency stops and the router's liveliness."""
+"""Forwards calls, part metadata, emergency stops and the router's liveliness token between robot_sim and clients of the port filter."""
 
 from __future__ import annotations
 
@@ -29,8 +29,9 @@ class Owner:
 
 
 class DriveServer:
-    """Forwards the drive calls of clients to robot_sim, unless the reflex moves the robot back after a violation.
+    """Forwards the drive calls of clients to robot_sim, unless the reflex is active.
 
+    The reflex moves the robot back along its past poses after a violation (a contact, or a pose beyond the limits of its motors).
     The calls are take, arm, release, and hold, which stops a part. A client that takes a drive (the right to command a part's motors) gets
     the epoch (number of the ownership) that robot_sim has given to the filter. `epochs`: dict from a part to the newest of these epochs;
     0: none yet.

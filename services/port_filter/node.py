@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs the port filter: forwards states to the clients, checks the pose, and forwards commands or runs the reflex."""
+"""Runs the port filter: forwards the robot's states to the clients, and the commands of the clients to the robot.
+
+If a measured pose is in contact or beyond a limit, the reflex moves the robot back instead, and commands are refused.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Forwards states to the clients, and their commands to the robot unless the reflex is active."""
+"""Forwards states to the clients, and their commands to the robot unless the reflex (the motion back out of contact) is active."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class MoveDetector:
         if command.ref == self._reference:
             self._moving = self._moving and t - self._since < REST_TIME * 1e9
             return False
-        begins = not self._moving
+        begins = not self._moving or t - self._since >= REST_TIME * 1e9
         self._reference, self._since, self._moving = command.ref, t, True
         return begins
 
@@ -71,7 +71,7 @@ class CommandStream:
         """Publish a command to robot_sim.
 
         `epoch`: number of the ownership of the part's drive. `re_k`: tick of the state from which the command was computed. `reference`:
-        positions [rad] or velocities [rad/s] of the part's motors, by `mode`. `ttl`: lifetime [ms].
+        (n_part,) rad, rad/s or N m, by `mode`. `ttl`: lifetime [ms].
         """
         self._stream.put(epoch=epoch, re_k=re_k, mode=mode, ref=reference, ttl=ttl)
         self._seq += 1

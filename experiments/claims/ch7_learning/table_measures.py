@@ -4,14 +4,15 @@
 A ghost of the table is an object at the same place that exerts no force.  Contact is computed from poses alone, in the same manner for the
 table and its ghost.
 
-On a graph of 16 neighbours some actions are tried more often than others even without a table, so tries are compared with those of the same
-agent at the ghost.
+In a graph in which each state has actions to 16 neighbours, some actions are tried more often than others even without a table.  So tries
+are compared with those of an agent with the same seed at the ghost.
 
 Contact is cyclic if the autocorrelation of the contact rate at the table has a second peak, whose lag is the period of the cycle, and the
 autocorrelation at the ghost has no such peak.  High values at the first lags only mean that contacts occur in groups.
 
-At a ghost no part disturbs another, except that the hands can meet.  So an action that ends elsewhere at the table than at the ghost
-depends on the poses of the other parts (paper 4.4).  For each judged run, these actions are found in the runs of all other seeds.
+At a ghost no part (torso or arm) disturbs another, except that the hands can meet.  So an action that ends elsewhere at the table than at
+the ghost depends on the poses of the other parts (section 4.4 of the paper in Frontiers in Neurorobotics 7:25).  For each judged run, these
+actions are found in the runs of all other seeds.
 """
 
 from __future__ import annotations
@@ -59,7 +60,7 @@ def spaces() -> dict[str, Lattice]:
 
 @cache
 def low() -> NDArray[np.bool_]:
-    """Return which states (81,) put the left or the right arm below the table's top when the torso is bent forward."""
+    """Return which states (81,) bring the left or the right arm into contact with the table when the torso is bent forward."""
     either: NDArray[np.bool_] = low_goals(ARMS[0]) | low_goals(ARMS[1])
     return either
 
@@ -88,7 +89,7 @@ def near_table(q: Array, arm: str, margin: float = NEAR_DISTANCE) -> NDArray[np.
 
 
 def low_goals(arm: str) -> NDArray[np.bool_]:
-    """Return which states (81,) put the arm below the table's top when the torso is bent forward (75 % of its pitch range)."""
+    """Return in which states (81,) a field of the arm overlaps the table when the torso is bent forward (75 % of its pitch range)."""
     space, pitch = arm_space(joints=JOINTS[arm]), robot().motor_index(TORSO[2])
     q = np.tile(robot().home, (len(space), 1))
     low, high = robot().limits[pitch]
@@ -209,16 +210,16 @@ class Run:
     def low_and_forward(self) -> float:
         """The share of the arms' actions in the second half that had a low goal and ended while the torso was bent forward.
 
-        A goal is low if it is below the table's top when the torso is bent forward.
+        A goal is low if it brings an arm into contact with the table when the torso is bent forward.
         """
         return self.number("low_and_forward")
 
     @property
     def arms_low(self) -> float:
-        """How often the arms aim low, in the second half of the run.
+        """How often the arms choose actions with a low goal, in the second half of the run.
 
-        This is the mean number of tries of their actions with a low goal, divided by that of their other actions.  A goal is low if it is
-        below the table's top when the torso is bent forward.
+        This is the mean number of tries of these actions, divided by that of the arms' other actions.  A goal is low if it brings an arm
+        into contact with the table when the torso is bent forward.
         """
         tries = np.sum([self.late_tries[arm] for arm in ARMS], axis=0)
         aims_low = low()[spaces()[ARMS[0]].goals]
@@ -226,7 +227,7 @@ class Run:
 
     @property
     def half_failing(self) -> int:
-        """The number of actions of both arms that failed in 10 to 90 % of their tries."""
+        """The number of actions of both arms that did not reach their goals in 10 to 90 % of their tries."""
         return sum(self._uncertain(arm) for arm in ARMS)
 
     def _uncertain(self, arm: str) -> int:
@@ -287,7 +288,8 @@ def of_arms(run: Run, ghost: Run) -> Array:
 def by_goal(ratios: Array) -> Array:
     """Average the ratios (2 arms, S, A) over all actions with the same goal state; returns (2, S), indexed by the goal state.
 
-    The result is 0 for a state that is the goal of no action.
+    `ratios`: the `log_ratios` of tries at table and ghost, as `of_arms` returns them.  The result is 0 for a state that is the goal of no
+    action.
     """
     goals = spaces()[ARMS[0]].goals
     count = np.bincount(goals.ravel(), minlength=len(goals))
@@ -312,7 +314,7 @@ def autocorrelation(rate: Array, most: int) -> Array:
 def share_of_top(ratios: Array, chosen: NDArray[np.bool_]) -> float:
     """Return the share of chosen actions among the 5 % of actions with the highest ratios, as a mean over both arms.
 
-    `ratios`: (2, S, A), of both arms.  `chosen`: (S, A).
+    `ratios`: (2, S, A), the `log_ratios` of tries at table and ghost, as `of_arms` returns them.  `chosen`: (S, A).
     """
     count = max(1, round(TOP_SHARE * ratios[0].size))
     return float(np.mean([chosen.ravel()[np.argsort(-ratio, axis=None)[:count]].mean() for ratio in ratios]))
@@ -327,7 +329,7 @@ def correlations(runs: Sequence[Run]) -> Array:
 
 
 def second_peak(curves: Array) -> int:
-    """Return the lag, in windows, of the second peak of an autocorrelation; the first peak is the one at the lag 0.
+    """Return the lag, in windows of 50 transitions, of the second peak of an autocorrelation; the first peak is the one at the lag 0.
 
     This is the lag at which the mean of `curves` (runs, lags) is largest, among the lags from 3 windows on.  If the mean is negative at any
     of these lags, those before its first negative value are left out, because they belong to the first peak.
@@ -352,8 +354,8 @@ def is_cyclic(ours: Array, theirs: Array) -> bool | None:
     """Return whether contact is cyclic: whether the autocorrelation has a second peak, above 0 and above that at the ghost.
 
     `ours`, `theirs`: autocorrelations (runs, lags) at the table and at the ghost; at least two runs.  True if the interval of the runs'
-    values at the second peak is above 0 and above that at the ghost.  Otherwise the largest value of each run at lags from 3 windows on is
-    compared: None (undecided) if the interval of these values is above that at the ghost, else False.
+    values at the second peak is above 0 and above that at the ghost.  Otherwise the largest value of each run at lags of at least 3 windows
+    (of 50 transitions) is compared: None (undecided) if the interval of these values is above that at the ghost, else False.
     """
     here, there = at_second_peak(ours, theirs)
     if interval(here)[0] > max(0.0, interval(there)[1]):
@@ -404,8 +406,9 @@ class Judged:
 def dependent(runs: Runs, parts: Sequence[str]) -> dict[int, NDArray[np.bool_]]:
     """Return a dict from each seed to the actions (S, A) of these parts that depend on other parts, according to all other seeds.
 
-    These actions have different outcomes at the table and at its ghost, which exerts no force.  Outcomes differ if their total variation is
-    more than 0.1.  The outcomes are counted in the runs of all explorers.  `parts`: parts with the same graph, counted together.
+    These actions have different outcomes at the table and at its ghost, which exerts no force.  Outcomes differ if they were seen in both
+    worlds, and their total variation is more than 0.1.  The outcomes are counted in the runs of all explorers.  `parts`: parts with the
+    same graph, counted together.
     """
     shape = (*spaces()[parts[0]].goals.shape, len(spaces()[parts[0]]))
     counts: dict[str, dict[int, Array]] = {}  # (S, A, S), by world and seed
@@ -415,13 +418,15 @@ def dependent(runs: Runs, parts: Sequence[str]) -> dict[int, NDArray[np.bool_]]:
             of_seed[run.seed] = of_seed.get(run.seed, np.zeros(shape)) + sum(run.ends[part] for part in parts)
     totals = {world: sum(of_seed.values(), start=np.zeros(shape)) for world, of_seed in counts.items()}
 
-    def shares(world: str, seed: int) -> Array:
-        others = totals[world] - counts[world].get(seed, 0)
-        found: Array = others / np.maximum(others.sum(axis=-1, keepdims=True), 1.0)
+    def depend(seed: int) -> NDArray[np.bool_]:
+        table, ghost = (totals[world] - counts[world].get(seed, 0) for world in ("table", "ghost"))
+        tried = table.sum(axis=-1), ghost.sum(axis=-1)
+        shares = (found / np.maximum(number, 1.0)[..., None] for found, number in zip((table, ghost), tried, strict=True))
+        variation = 0.5 * np.abs(np.subtract(*shares)).sum(axis=-1)
+        found: NDArray[np.bool_] = (variation > DIFFERENT) & (tried[0] > 0) & (tried[1] > 0)
         return found
 
-    seeds = sorted(set().union(*counts.values()))
-    return {seed: 0.5 * np.abs(shares("table", seed) - shares("ghost", seed)).sum(axis=-1) > DIFFERENT for seed in seeds}
+    return {seed: depend(seed) for seed in sorted(set().union(*counts.values()))}
 
 
 def judged_of(runs: Runs, explorer: str, learner: str, score: str) -> list[Judged]:

@@ -38,10 +38,10 @@ class Original:
 
 
 def find_originals(folders: list[Path]) -> list[Original]:
-    """Return every distinct robot or world file of the format before 2.0 that is found in the given folders.
+    """Return every distinct robot or world file in a MoBeE format before version 2.0 that is found in the given folders.
 
-    If Git repositories below a folder have such files in their histories, these files are returned; otherwise the XML files below the
-    folder are returned.  Robots come before worlds, and older files before newer ones.
+    If Git repositories below a folder have such files in their histories, these files are returned; otherwise such files below the folder
+    itself, with names that end in ".xml", are returned.  Robots come before worlds, and older files before newer ones.
 
     Raises InvalidValue for a folder that does not exist, and if Git is not installed.
     """
@@ -79,7 +79,8 @@ def _git(repository: Path, *words: str) -> bytes:
 def _in_history(repository: Path) -> Iterator[Original]:
     """Yield every version of every XML file of any commit."""
     name = repository.parent.name if repository.name in (".git", "repo") else repository.name
-    log = _git(repository, "log", "--all", "-m", "--root", "--raw", "--no-abbrev", "--format=@%ad", "--date=short", "--", "*.xml", "*.XML")
+    options = ("--all", "-m", "--root", "--raw", "--no-renames", "--no-abbrev", "--format=@%ad", "--date=short")
+    log = _git(repository, "log", *options, "--", "*.xml", "*.XML")
     date = ""
     for line in log.decode("utf-8", "replace").splitlines():
         if line.startswith("@"):

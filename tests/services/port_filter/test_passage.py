@@ -26,6 +26,11 @@ def test_a_move_begins_where_the_reference_leaves_a_rest() -> None:
     assert begins(MoveDetector(), [1.0] * 20 + [2.0, 3.0] + [4.0] * 20 + [3.0]) == [0, 20, 42]
 
 
+def test_a_position_that_is_sent_once_rests_too() -> None:
+    moves = MoveDetector()
+    assert [begins(moves, [position], start=k) for k, position in ((0, 1.0), (9, 2.0), (50, 3.0))] == [[0], [], [50]]
+
+
 def test_a_reference_that_pauses_briefly_is_one_motion() -> None:
     assert begins(MoveDetector(), [1.0, 2.0, 2.0, 2.0, 3.0]) == [0]
 
