@@ -29,11 +29,12 @@ _OWN = ("{service}", "{source}")  # variables that stand for the name of the wri
 
 @dataclass(frozen=True, slots=True)
 class Rights:
-    """What one identity may do on the bus, as key expressions without the namespace; everything else is denied.
+    """What one identity (a service, program or person with a certificate) may do on the bus; everything else is denied.
 
-    `writes`, `reads`: keys of streams that it may publish and subscribe to. `calls`, `answers`: keys of calls that it may make and answer.
-    `tokens`: liveliness tokens that it may declare; every identity may read all tokens. `keeps`: streams among `writes` whose past messages
-    it sends to late readers. `catches_up`: streams among `reads` whose past messages it may request.
+    All fields are key expressions without the namespace. `writes`, `reads`: keys of streams that it may publish and subscribe to. `calls`,
+    `answers`: keys of calls that it may make and answer. `tokens`: liveliness tokens that it may declare; every identity may read all
+    tokens. `keeps`: streams among `writes` whose past messages it sends to late readers. `catches_up`: streams among `reads` whose past
+    messages it may request.
     """
 
     writes: tuple[str, ...]

@@ -29,7 +29,8 @@ def drive(part: str, verb: str) -> str:
 def goal(part: str, verb: str) -> str:
     """Return the key of a call to the controller about the goal of a part, that is, the right to set its attractor.
 
-    `part`: name of the part; * means all parts. `verb`: take, release, goal, force or reach.
+    `part`: name of the part; * means all parts. `verb`: take, release, goal (set the attractor), force (apply a client's force) or reach
+    (pull a marker to an object).
     """
     return f"{_part_or_all(part)}/rpc/{chunk(verb)}"
 
@@ -37,14 +38,18 @@ def goal(part: str, verb: str) -> str:
 def waypoint(part: str) -> str:
     """Return the key of the call that marks the newest safe pose as a waypoint, to which the port filter may later move the robot back.
 
-    If the port filter is stuck, because it has found no motion back, the call instead declares the present pose safe. `part`: name of any
-    part, since the call concerns the whole robot; * means all parts.
+    The port filter is a service that forwards commands of clients, and moves the robot back from unsafe poses. If it has found no motion
+    back, the call instead declares the present pose safe. `part`: name of any part, since the call concerns the whole robot; * means all
+    parts.
     """
     return f"{_part_or_all(part)}/rpc/waypoint"
 
 
 def sim(verb: str) -> str:
-    """Return the key of a call to robot_sim about the simulation; `verb`: reset, pause, resume, place or pace."""
+    """Return the key of a call to robot_sim about the simulation.
+
+    `verb`: reset, pause, resume, place (move an object) or pace (set the speed in lockstep).
+    """
     return f"sim/rpc/{chunk(verb)}"
 
 
@@ -56,8 +61,8 @@ def world_rpc(verb: str) -> str:
 def service_rpc(who: str, verb: str) -> str:
     """Return the key of a call to the service `who`.
 
-    `verb`: every service answers stat, pulse, mark (set the counters to 0), config and shutdown; an agent also answers rest (release its
-    part), resume and explore.
+    `verb`: every service answers stat (status), pulse (numbers that show whether it handles messages), mark (set the counters to 0), config
+    and shutdown; an agent also answers rest (release its part), resume and explore (set its exploration strategy).
     """
     return f"{chunk(who)}/rpc/{chunk(verb)}"
 

@@ -111,7 +111,7 @@ class StepDone(Message, frozen=True, kw_only=True):
 
 
 class Turn(Message, frozen=True, kw_only=True):
-    """Message to one participant in lockstep, which the key names: tick k waits for the answer of this participant.
+    """Message in lockstep to the participant that is named in the key: tick k waits for the answer of this participant.
 
     The tick waits because the participant may have an action to decide.
     """
@@ -169,7 +169,10 @@ class Order(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Answer(Struct, frozen=True, forbid_unknown_fields=True):
-    """Answer of the controller to a tick in lockstep, inside `Commands`; its fields have the same meaning as in `StepDone`."""
+    """Answer of the controller to a tick, as a field of `Commands`, in lockstep (each tick waits for all participants).
+
+    Its fields have the same meaning as in `StepDone`.
+    """
 
     ok: bool
     busy: list[Name]
@@ -179,7 +182,8 @@ class Answer(Struct, frozen=True, forbid_unknown_fields=True):
 class Commands(Message, frozen=True, kw_only=True):
     """Commands to the motors of several parts, computed from the state of tick re_k; parts that are not named are not affected.
 
-    The parts hold `ttl` ms after the start of that tick. `parts` has the kind of command of each part, `ref` its values for all motors.
+    A part goes into hold (brakes and stands still) `ttl` ms after the start of that tick (in lockstep after 3 ticks), unless it has got a
+    newer command. `parts` has the kind of command of each part, `ref` the values for all motors.
     """
 
     stream: ClassVar[Stream] = Stream("commands", "CONTROL", writers=("controller", "driver"), readers=("robot_sim",), when="every tick")

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Requests and replies of calls, and the table of all calls; a request id makes a repeated call harmless."""
+"""Requests and replies of calls, and the table of all calls.
+
+A call may be sent again if its reply is lost: a request with an id that was used before has no second effect. Positions and orientations
+are in the root frame, quaternions are wxyz. The world of the service `model` is the set of the objects around the robot that it knows.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +29,7 @@ class Empty(Request, frozen=True, kw_only=True):
 
 
 class Take(Request, frozen=True, kw_only=True):
-    """Take the ownership of a part's drive (right to command its motors) or goal (right to set its attractor), as the key says.
+    """Take the ownership of a part's drive (right to command its motors) or goal (right to set its attractor), depending on the key.
 
     The ownership also ends when the caller's liveliness token, by which others see that the caller runs, disappears.
     """
@@ -34,13 +38,16 @@ class Take(Request, frozen=True, kw_only=True):
 
 
 class WithEpoch(Request, frozen=True, kw_only=True):
-    """The request of `drive/arm`, `drive/release`, `drive/hold` and `release`, which only the owner of the drive or goal may call."""
+    """The request of `drive/arm`, `drive/release`, `drive/hold` and `release`.
 
-    epoch: Count  # epoch of the caller's ownership, as in `Taken`
+    Only the owner of the part's drive (right to command its motors) or goal (right to set its attractor) may call these.
+    """
+
+    epoch: Count  # number of the caller's ownership, as in `Taken`
 
 
 class Goal(Request, frozen=True, kw_only=True):
-    """Set a part's attractor and start an action."""
+    """Set a part's attractor, and start an action: the motion of the part to the attractor, until the part settles or times out."""
 
     epoch: Count  # goal epoch of the caller, as in `Taken`
     action_id: Name  # id that the caller chooses; `Motion` reports it
@@ -61,12 +68,15 @@ class Force(Request, frozen=True, kw_only=True):
 
 
 class ReachFor(Request, frozen=True, kw_only=True):
-    """Start an action that pulls a marker to an object of the model's world until the part has settled (thesis 8.2)."""
+    """Start an action in which a force pulls a marker (named point of a link) to an object until the part has settled (thesis 8.2).
+
+    The object is one of the world of the service `model`.
+    """
 
     epoch: Count  # goal epoch of the caller, as in `Taken`
     action_id: Name  # id that the caller chooses; `Motion` and `Reach` report it
     marker: Name  # marker that is pulled
-    object: Name  # name of the target in the model's world
+    object: Name  # name of the target in the world of the service `model`
     position: Vector3  # m, present position of the target; later positions come from the model
     radius: Annotated[float, Meta(gt=0)]  # m, radius of the target
     aim: Aim  # whether the marker is to come to the centre or to the surface of the target
@@ -76,14 +86,14 @@ class ReachFor(Request, frozen=True, kw_only=True):
 
 
 class Place(Request, frozen=True, kw_only=True):
-    """Move a simulated object to a position."""
+    """Move an object of the simulator to a position."""
 
     name: Name
-    position: Vector3  # m
+    position: Vector3  # m, root frame
 
 
 class Pace(Request, frozen=True, kw_only=True):
-    """Set the speed of a simulation in lockstep."""
+    """Set the largest speed of a simulation in lockstep, relative to real time."""
 
     speed: Annotated[float, Meta(ge=0, le=1000)]  # largest simulated time per real time; 0: as fast as the processes answer
 
@@ -95,45 +105,45 @@ class Explore(Request, frozen=True, kw_only=True):
 
 
 class AddObject(Request, frozen=True, kw_only=True):
-    """Add an object to the model's world, or replace the one of the same name."""
+    """Add an object to the world of the service `model`, or replace the one of the same name."""
 
     name: Name
     geometry: Geometry
-    position: Vector3  # m
-    quaternion: Quaternion
+    position: Vector3  # m, root frame
+    quaternion: Quaternion  # orientation in the root frame
     role: Role
 
 
 class MoveObject(Request, frozen=True, kw_only=True):
-    """Set the pose of an object of the model's world."""
+    """Set the pose of an object of the world of the service `model`."""
 
     name: Name
-    position: Vector3  # m
+    position: Vector3  # m, root frame
     quaternion: Quaternion | None = None  # None: the orientation stays the same
 
 
 class SetRole(Request, frozen=True, kw_only=True):
-    """Set the role of an object of the model's world."""
+    """Set the role of an object of the world of the service `model`: obstacle, target or ghost (exerts no force)."""
 
     name: Name
     role: Role
 
 
 class OneName(Request, frozen=True, kw_only=True):
-    """Remove an object from the model's world, or detach it from its link; the key says which."""
+    """Remove an object from the world of the service `model`, or detach it from its link, depending on the key."""
 
     name: Name
 
 
 class Attach(Request, frozen=True, kw_only=True):
-    """Attach an object of the model's world to a link, with which it then moves."""
+    """Attach an object of the world of the service `model` to a link, with which it then moves."""
 
     name: Name
     link: Name
 
 
 class JacobianAt(Request, frozen=True, kw_only=True):
-    """Request the Jacobian of a marker at q [rad]; without q, at the newest pose."""
+    """Request the Jacobian of a marker (named point of a link) at q [rad]; without q, at the newest pose."""
 
     marker: Name
     q: RobotVector | None = None  # rad, of all motors; None: the newest pose
@@ -182,12 +192,12 @@ class PartMeta(Reply, frozen=True, kw_only=True):
 
 
 class ObjectState(Struct, frozen=True, forbid_unknown_fields=True):
-    """An object of the model's world, in the reply `World`."""
+    """An object of the world of the service `model`, in the reply `World`."""
 
     name: Name
     geometry: Geometry
-    position: Vector3  # m
-    quaternion: Quaternion
+    position: Vector3  # m, root frame
+    quaternion: Quaternion  # orientation in the root frame
     role: Role
     link: str  # link to which the object is attached; empty: none
     margin: Annotated[float, Meta(ge=0)] = 0.0  # m by which the shape is larger than the object on each side, for an uncertain position
@@ -195,7 +205,7 @@ class ObjectState(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class World(Reply, frozen=True, kw_only=True):
-    """Reply to the call `model/rpc/world/list`: all objects of the model's world."""
+    """Reply to the call `model/rpc/world/list`: all objects of the world of the service `model`."""
 
     objects: list[ObjectState]
     stale: dict[Name, float] = {}  # perceived objects that were removed because they are not seen any more: s since the last picture

@@ -1,4 +1,4 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The version of the contract; a receiver refuses messages of every other version."""
+"""The version of the contract (all messages, calls and keys of the bus); a receiver refuses messages of every other version."""
 
 VERSION = 8

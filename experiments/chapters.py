@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The published claims by chapter of the thesis: a part of docs/results.md, written from the table of claims."""
+"""The published claims by chapter of the thesis: a part of docs/results.md, written by `mobee experiment claims --write`."""
 
 from __future__ import annotations
 
@@ -32,7 +32,10 @@ _PARTS: dict[str, tuple[str, ...]] = {
 
 
 def chapter_of(claim: Claim) -> int:
-    """Return the number of the first thesis chapter that the claim's source names; 7 if the source names only the paper."""
+    """Return the number of the first thesis chapter that the claim's source names; 7 if the source names only the paper.
+
+    The paper is Frank et al., Frontiers in Neurorobotics 7:25, 2014; it has the topic of chapter 7.
+    """
     found = re.search(r"thesis (\d+)", claim.source)
     return int(found[1]) if found else _PAPER
 

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The command `mobee`: one file per verb."""
+"""The command `mobee`: one module or package per verb (first argument)."""

@@ -63,7 +63,7 @@ ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")  # m
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the verb that the arguments name (default: sys.argv), and return its exit code.
+    """Run the verb (subcommand) that the arguments name (default: sys.argv), and return its exit code.
 
     0: ok; 1: the task failed; 2: bad input; 3: a fault of the environment; 130: interrupted.
     """
@@ -101,7 +101,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 def parser_of(verb: str) -> argparse.ArgumentParser:
-    """Return the parser for the options of a verb. The verb's module is imported."""
+    """Return the parser for the options of a verb (subcommand of `mobee`). The verb's module is imported."""
     parser = _Parser(prog=f"mobee {verb}", description=VERBS[verb], formatter_class=argparse.RawDescriptionHelpFormatter)
     importlib.import_module(f"mobee_cli.{verb}").add_arguments(parser)
     return parser

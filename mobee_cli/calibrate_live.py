@@ -62,7 +62,7 @@ class Shot(NamedTuple):
 
 
 class Pictures:
-    """Collects the pictures of the cameras in `rig` that arrive on the bus.
+    """Collects the pictures that arrive on the bus from the cameras of `rig` (the robot with its cameras, their lens, and a tag).
 
     `shots`: complete sets of pictures, in order of arrival; the caller may clear this list.
     """

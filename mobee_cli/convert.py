@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mobee convert`: converts zero-position XML to URDF and back, and older zero-position files to the present format."""
+"""`mobee convert`: converts robot files from zero-position XML to URDF and back.
+
+A zero-position XML describes a robot in the pose in which every joint is at zero, with all axes in the root frame. Robot and world files
+in older versions of this format are converted to the present one.
+"""
 
 from __future__ import annotations
 

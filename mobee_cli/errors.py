@@ -7,7 +7,7 @@ from services.common.exit_codes import FAILED
 
 
 class UserError(Exception):
-    """Raised to end a verb. The text is printed on standard error; `code` is the exit code of the command."""
+    """Raised to end a verb (subcommand of `mobee`). The text is printed on standard error; `code` is the exit code of the command."""
 
     def __init__(self, text: str, code: int = FAILED) -> None:
         super().__init__(text)

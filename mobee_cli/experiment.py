@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mobee experiment`: lists and runs the experiments, draws their figures, and prints the table of claims."""
+"""`mobee experiment`: lists and runs experiments, draws figures, prints claims.
+
+A claim is a statement of a publication, or an aim of this project, with the number that an experiment has measured for it.
+"""
 
 from __future__ import annotations
 

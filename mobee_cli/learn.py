@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run `mobee learn`: derive agents from the robot, let them learn, print the results, and return the exit code."""
+    """Run `mobee learn`: make agents for the parts of the robot, let them learn, print the results, and return the exit code."""
     curves = arguments.store.with_name(f"{arguments.store.stem}-tensorboard")
     if arguments.store.suffix != ".sqlite":
         raise UserError(f"--store {arguments.store}: its name must end in .sqlite", BAD_INPUT)

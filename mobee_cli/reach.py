@@ -249,7 +249,7 @@ def _place(position: Array) -> str:
 
 
 def store_of(run: Path) -> Path:
-    """Return the path of a run's database. `run`: folder of the run, or the path of the database itself."""
+    """Return the path of a run's SQLite file of transitions and reaches. `run`: folder of the run, or the path of the file itself."""
     return run / STORE if run.is_dir() else run
 
 

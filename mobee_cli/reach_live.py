@@ -41,8 +41,9 @@ MOVES = {"position": 5e-5, "velocity": 5e-3, "torque": 25e-3}  # rad, rad/s, N m
 
 
 class LivePlant(BusPlant):
-    """A BusPlant whose calls raise an error after a time limit.
+    """The running robot as a `BusPlant` (moves parts by messages on the bus), with time limits for measurements, actions and reaches.
 
+    After a time limit UserError is raised.
     It also measures how soon the robot begins to move after a reach is requested.
     """
 

@@ -47,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run `mobee replay`: show the run, play it into a service, or compare it with another run, as the options say.
+    """Run `mobee replay`: by the options, show the run, play it into a service, or compare it with another run.
 
     Returns the exit code.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Formats the results of an experiment for a terminal: as lines, and as tables where several results have the same names."""
+"""Formats the results of an experiment as text for a terminal: a line for each value, and a table for dicts with the same keys in a row."""
 
 from __future__ import annotations
 

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Options for the robot and the world, for verbs that need no running system."""
+"""Options for the robot and the world.
+
+They are for verbs (first arguments of the command `mobee`) that need no running system.
+"""
 
 from __future__ import annotations
 
@@ -47,7 +50,7 @@ _RUN_SETTINGS = "scenario.toml"  # in the folder of a run of `mobee launch`
 
 
 def add_robot(parser: argparse.ArgumentParser, text: str) -> None:
-    """Add the option --robot, and options for URDF files, to a parser. `text`: explains the default in the help."""
+    """Add the option --robot, and options for URDF files, to a parser. `text`: default of --robot, for the help."""
     parser.add_argument("--robot", metavar="FILE", help=f"shipped robot, or path of a .xml or .urdf file ({text})")
     add_urdf_options(parser)
 
@@ -110,10 +113,10 @@ def given_options(arguments: argparse.Namespace, names: Sequence[str] = ("robot"
 
 
 def require_none(arguments: argparse.Namespace, why: str, names: Sequence[str] = ("robot", "world")) -> None:
-    """Raise UserError if the user has given an option for the robot, the world or URDF files. Verbs that cannot use these options call it.
+    """Raise UserError if the user has given an option for the robot, the world or URDF files, because this command cannot use it.
 
-    `why`: why the verb cannot use them. The error contains the first such option, then this text. `names`: which of the options --robot and
-    --world to refuse; options for URDF files are always refused.
+    `why`: why the command cannot use it. The error contains the first such option, then this text. `names`: which of the options --robot
+    and --world to refuse; options for URDF files are always refused.
     """
     for option in given_options(arguments, names):
         raise UserError(f"{option}: {why}", BAD_INPUT)

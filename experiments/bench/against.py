@@ -55,7 +55,10 @@ class Settings:
 
 
 class AgainstFailed(MobeeError):
-    """Raised if a checkout does not exist, or if a case does not run in it.  The message contains the last line of its output."""
+    """Raised if a checkout does not exist, or if a case does not run in it.
+
+    If a process failed, the message contains the last line of its output.
+    """
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,7 +181,7 @@ def measure(settings: Settings) -> dict[str, Any]:
 
 
 def measure_checkouts(old: Checkout, new: Checkout, cases: Sequence[str], rounds: int) -> dict[str, Any]:
-    """Measure the cases in two checkouts and return the result; raises AgainstFailed.
+    """Measure the cases in two checkouts and return the result; raises AgainstFailed if a case does not run in one of them.
 
     `cases`: names in `against_cases.CASES`.  `rounds`: number of rounds of each case.  Keys: "rounds", this number; "cases", a dict from
     the name of each case to the times of both checkouts and their ratio, as `compared` returns them; "requirements", a list with a dict for

@@ -4,6 +4,9 @@
 Claim: on the motor model, encoder noise included, every action of three curious agents ends at the same tick, in the same state and within
 1e-9 rad of the same posture in both.  Run time: about 30 s for 100 actions.
 
+The live system consists of real processes, which exchange messages; in lockstep every tick waits for all of them.  The offline plant
+simulates the robot in one process.  The motor model simulates motors without a physics engine.
+
 One difference is by design: robot_sim has a safety gate, which brakes a motor that could not stop before its limit; the plant has hard
 stops only.  No action of these agents moves a motor so near to a limit that the gate brakes.
 """

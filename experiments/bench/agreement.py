@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compares the contacts of the model with those of its peers: the same pairs, and depths that are right and minimal.
+"""Compares the contacts of the model with those of its peers, which are MuJoCo, python-fcl and coal.
+
+The pairs of volumes in contact must be the same, and the model's depths must be right and minimal.
 
 If two volumes overlap by less than MIN_OVERLAP, two programs may differ on whether they touch.  A depth is *right* if it is the distance
 that the first volume must move along the normal until a plane separates the two.  It is *minimal* if no peer gives a direction in which a

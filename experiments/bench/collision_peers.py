@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""python-fcl and coal on the benchmark's scenes.
+"""Collision detection by python-fcl and coal for a robot and the objects of a world, to compare MoBeE's model with them.
 
 python-fcl computes only whether each pair touches, which is the fastest of its queries.
 """

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures of the processor time of the model, of the plant and of plans for various sizes: `mobee bench model|plant|vi --figure FILE`."""
+"""Figures of processor time over problem size, for model, plant and plans: `mobee bench model|plant|vi --figure FILE`.
+
+The times are those of a pose of the model, of a tick or a second of the offline plant, and of a plan (the solution of an MDP).
+"""
 
 from __future__ import annotations
 
@@ -89,9 +92,9 @@ def _measured(points: list[tuple[str, float]]) -> Iterator[Iterator[tuple[str, f
 
 
 def model_costs(quick: bool, rounds: int | None = None, poses: int = 500) -> Curves:
-    """Measure the cost of evaluating a pose of the model and of its peers, for several numbers of boxes and of primitives.
+    """Measure the processor time of evaluating a pose, by our model and by other programs, for several numbers of boxes and of primitives.
 
-    Returns {"boxes" or "primitives": {number: {contestant: median processor time [us] per pose}}}.  "number" counts the boxes around the
+    Returns {"boxes" or "primitives": {number: {program: median processor time [us] per pose}}}.  "number" counts the boxes around the
     robot, or the robot's primitives (collision volumes).  `poses`: poses per round.  `rounds`: None for 9, or for 3 if `quick`.  Raises
     NotInstalled without MuJoCo or python-fcl.
     """

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Contact checks along the edges of a roadmap: time for the 400 000 poses of thesis 4.3.3, for each edge once, and for edges near a change.
 
-Four methods are compared: all poses of every edge; every edge in both directions; every edge once; after an object was added, only the
-edges near it.  The 400 000 poses are 5000 vertices with 8 edges each and 10 poses an edge; their time is computed from the time per pose of
-the second method.  The roadmap is the thesis' pre-grasp map: the right palm above the table, one vertex every few millimetres, 8 neighbours
-(figure 4.8).
+Four methods are compared.  The first checks all poses of every edge, in batches.  The others use `mobee.roadmap.edges`, which ends the
+check of an edge at its first contact: every edge in both directions; every edge once; after an object was added, only the edges near it.
+The 400 000 poses are 5000 vertices with 8 edges each and 10 poses an edge; their time is computed from the time per pose of the second
+method.  The roadmap is the thesis' pre-grasp map: the right palm above the table, one vertex every few millimetres, 8 neighbours (figure
+4.8).
 """
 
 from __future__ import annotations
@@ -62,10 +63,10 @@ def measure(settings: Settings) -> dict[str, Any]:
     """Run this benchmark and return its result.
 
     Main keys: "vertices" and "edges", their numbers in the roadmap; processor times [s] of the methods, medians of the rounds: "plain_s"
-    (each edge once, all poses), "both_s" (each edge in both directions), "once_s" (each edge once), "change_s" (after an object was added,
-    only the edges near it) and "all_s" (after that, all edges); "plain_poses", "both_poses" and "once_poses", numbers of checked poses;
-    "agree", whether all methods find the same edges free of contacts; "requirements", a list with the dict that `Requirement.judge` returns
-    for each requirement; "passed", whether all are met and the methods agree.
+    (each edge once, all its poses, also after a contact), "both_s" (each edge in both directions), "once_s" (each edge once), "change_s"
+    (after an object was added, only the edges near it) and "all_s" (after that, all edges); "plain_poses", "both_poses" and "once_poses",
+    numbers of checked poses; "agree", whether all methods find the same edges free of contacts; "requirements", a list with the dict that
+    `Requirement.judge` returns for each requirement; "passed", whether all are met and the methods agree.
     """
     with one_core() as core, Progress() as progress:
         progress.show(0.0, "making the map")

@@ -3,11 +3,12 @@
 
 Claim: the parts of the robot that depend on a process hold (brake and stand still) within 30 ms after it is killed, and within 120 ms after
 it freezes, in 95 of 100 cases, on a machine that does nothing else; every part follows commands again within 5 s of the last fault; no
-transition is lost, stored twice or stored with other values; no motor is faster than the gate allows, and none obeys a command that answers
-a tick of more than 100 ms ago.  The number of a schedule is the seed with which it is drawn; all schedules are performed on one running
-system.  If a schedule breaks a guarantee, faults can be removed from it while a guarantee is still broken (`shrink`).  Times are judged
-only in real time and if the load was low; the load is part of the result.  If there is a quiet period before the schedules: under faults
-the agents make at least four fifths as many transitions a second as in this period.  Run time: about 10 s for each schedule.
+transition is lost, stored twice or stored with other values; no motor is faster than the gate (the check of commands before the motors)
+allows, and none obeys a command that answers a tick of more than 100 ms ago.  A schedule is a random sequence of faults; its number is the
+seed with which it is drawn; all schedules are performed on one running system.  If a schedule breaks a guarantee (such as that on motor
+speeds), faults can be removed from it while a guarantee is still broken (`shrink`).  Times are judged only in real time and if the load was
+low; the load is part of the result.  If there is a quiet period before the schedules: under faults the agents make at least four fifths as
+many transitions a second as in this period.  Run time: about 10 s for each schedule.
 """
 
 from __future__ import annotations
@@ -51,9 +52,9 @@ class Settings:
 
     `schedules`: number of schedules of faults.  `seed`: seed of the first schedule; each next one has the next seed.  `seconds`: duration
     of each schedule [s].  `period`: mean time between two faults [s].  `shrink`: if a schedule breaks a guarantee, up to `shrink` schedules
-    with fewer of its faults are performed, to find a shorter one that breaks a guarantee; 0: none.  `scenario`: scenario of the system.
-    `quiet`: time without faults [s] before the first schedule, to compare the transitions a second with those under faults; 0: no
-    comparison.
+    with fewer of its faults are performed, to find a shorter one that breaks a guarantee; 0: none.  `scenario`: name or path of the file
+    that lists the system's services.  `quiet`: time without faults [s] before the first schedule, to compare the transitions a second with
+    those under faults; 0: no comparison.
     """
 
     schedules: int = 20

@@ -39,7 +39,7 @@ REQUIREMENTS = (
 class Settings:
     """Settings of the benchmark.
 
-    `steps`: steps of each environment in a round.  `rounds`: number of rounds, of which the median is reported.
+    `steps`: number of steps of each player in a round, as in `players`.  `rounds`: number of rounds, of which the median is reported.
     """
 
     steps: int = 500

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Solvers of inverse kinematics for comparison with the library's, on the same problems: mink and the thesis' rivals.
+"""Solvers of inverse kinematics for comparison with the library's, on the same problems: mink, and optimisers of the thesis (rivals).
 
 The rivals (thesis 3.1.1) are CMA-ES, simulated annealing, a particle filter and xNES; each ends at the first pose within all tolerances.
 mink computes differential inverse kinematics on MuJoCo by quadratic programs; here it is restarted, and its poses are tested for contacts
@@ -67,9 +67,10 @@ class Target:
 
 
 def xnes(problem: Problem, seed: int, most: int) -> Array | None:
-    """Search for a pose by xNES as published (Glasmachers 2010), with its default population and with the library's limits and restarts.
+    """Search for a pose by xNES as published (Glasmachers 2010), with its default population.
 
-    Returns a pose (n,) rad within all tolerances, or None after `most` evaluations.  `seed`: of the random numbers.  `problem`: the inverse
+    Limits and restarts are those of the library's NES, but it restarts only after ten times as many generations without gain.  Returns a
+    pose (n,) rad within all tolerances, or None after `most` evaluations.  `seed`: of the random numbers.  `problem`: the inverse
     kinematics problem.  `most`: largest number of evaluations (poses whose cost is computed).
     """
     low, high = problem.limits.T

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The live system in lockstep, in which ticks wait for all services: its speed on the motor model, on PyBullet and on MuJoCo.
+"""The live system in lockstep, in which ticks wait for all services: its speed with each back-end of the simulated robot.
+
+The back-ends are the motor model ("kinematic"), PyBullet and MuJoCo.
 
 Claim: robot_sim, model, controller and three agents, each in its own process, simulate at least 15 s of robot time per second on the motor
 model and 10 s on PyBullet, at ticks of 20 ms, on the standard machine.  Before and after every run the speed of this machine is measured

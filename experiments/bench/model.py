@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The egocentric model compared with MuJoCo and python-fcl: poses per second, and whether they find the same contacts.
+"""The egocentric model (link poses and contacts of the robot) compared with MuJoCo and python-fcl: speed, and agreement of contacts.
 
 Claim: one compiled kernel makes the model of thesis chapter 2 the fastest of its kind, on the iCub and on robots of other makers
 (scenes.py).  Our model computes every contact with depth, normal and point, and the projection of the contacts to the motors (the sum in

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MuJoCo for comparison: kinematics and collision detection on the benchmark's scenes, and the time of its steps on the plant's robot."""
+"""MuJoCo for comparison: kinematics and collision detection of a robot in a world, and the time of its simulation steps."""
 
 from __future__ import annotations
 
@@ -121,8 +121,8 @@ def _add_servos(mujoco: Any, spec: Any, joints: int, gain: float) -> None:
 def us_per_tick(plant: OfflinePlant, ticks: int, seed: int = 0) -> float:
     """Return the processor time [us] of MuJoCo's steps for one control tick, while random velocities are commanded to the joints.
 
-    `plant`: the offline plant whose robot, world, tick and substeps MuJoCo gets.  `ticks`: number of timed ticks.  `seed`: of the
-    velocities.
+    `plant`: the offline plant (a robot simulated in one process) whose robot, world and tick MuJoCo gets; a tick has as many substeps as
+    with the default motor parameters.  `ticks`: number of timed ticks, rounded down to a multiple of 50.  `seed`: of the velocities.
     """
     alive = np.isin(np.arange(len(plant.robot.motors)), plant.motors.living)
     robot = stiffened(plant.robot, alive, solids=False)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """A system on two hosts whose network is disturbed: age of the commands that the robot obeys, times until its parts stop and move again.
 
-Claim: no command is obeyed that answers a tick of more than 100 ms ago by robot_sim's clock.  Parts of the robot hold (brake and stand
-still) if a cut separates them from their controller.  A part begins no new action if a cut separates it from its agent.  Every part moves
-again within 5 s after the network works again.  No transition is lost, stored twice or stored with other values.  No motor is faster than
-the gate allows.
+Claim: robot_sim obeys no command that answers a tick (control period) which began more than 100 ms ago by its clock.  Parts of the robot
+hold (brake and stand still) if a cut separates them from their controller.  A part begins no new action if a cut separates it from its
+agent.  Every part moves again within 5 s after the network works again.  No transition is lost, stored twice or stored with other values.
+No motor is faster than the gate (the last check before the motors) allows.
 
 The hosts are network namespaces on this machine.  Their connections are encrypted (TLS), with a key for each process.  The monotonic clock
 of the second host is an hour ahead.  Packets are delayed, lost and reordered at random, with a seed.  Times are judged only if the load was
@@ -84,8 +84,9 @@ FAULTS = (
 class Settings:
     """Settings of the benchmark.
 
-    `layouts`: keys of LAYOUTS, which say what runs on the second host.  `faults`: names of disturbances in FAULTS.  `seconds`: duration of
-    each disturbance [s].  `rounds`: how often each disturbance is repeated.  `seed`: seed by which packets are lost and reordered.
+    `layouts`: keys of LAYOUTS, which lists the services on the second host.  `faults`: names of disturbances in FAULTS.  `seconds`:
+    duration of each disturbance [s].  `rounds`: how often each disturbance is repeated.  `seed`: seed by which packets are lost and
+    reordered.
     """
 
     layouts: tuple[str, ...] = tuple(LAYOUTS)

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The offline plant: how fast it is compared with MuJoCo's stepper on the same robot, and how much faster plants are in a batch.
+"""The offline plant, a simulation of the robot in one process: its speed compared with MuJoCo's stepper, and that of a batch.
 
-One arm moves to random states of its lattice, one arm reaches, and three curious agents act at the table, as in the published experiments.
+One arm moves to random states of its lattice, one arm reaches for targets, and three curious agents act at the table, as in the published
+experiments.
 """
 
 from __future__ import annotations
@@ -68,9 +69,9 @@ def measure(settings: Settings) -> dict[str, Any]:
     """Run this benchmark and return its result; raises NotInstalled without MuJoCo.
 
     Main keys: "one_arm", "reaching" and "three_agents", each a dict with the median rates of `Pace.numbers` and `Pace.standard`;
-    "mujoco_us_per_tick", MuJoCo's processor time of a tick, and "times_mujoco", this time over ours; "batch", the result of
-    `measure_batch`; "requirements", a list with the dict that `Requirement.judge` returns for each requirement; "same_hash", whether two
-    equal runs made the same trajectory; "passed", whether all requirements are met and the hashes are equal.
+    "mujoco_us_per_tick", MuJoCo's processor time of a tick, and "times_mujoco", this time divided by that of our plant with one arm;
+    "batch", the result of `measure_batch`; "requirements", a list with the dict that `Requirement.judge` returns for each requirement;
+    "same_hash", whether two equal runs made the same trajectory; "passed", whether all requirements are met and the hashes are equal.
     """
     load_mujoco()
     runs: dict[str, Callable[[], Pace]] = {

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The stopwatch of `mobee play`: from the command to the first curious action that a browser shows, with an empty home folder.
+"""The time that `mobee play` needs from the command to the first curious action that a browser shows, with an empty home folder.
 
 Claim: the web page shows the first action of a curious agent at most 20 s after the command, 5 s of which are learning offline.  Each start
 is a command of its own, with an empty home and an empty working directory, and headless Chromium opens the page as soon as its address is
 printed.  The 3D view is not loaded: without a graphics card the browser would draw it on the processor.  The time without the learning is
 converted to the time that the standard machine (calibration.py) needs.  For this, the speed of this machine is measured by two processes
-that do the calibration loop at the same time.  At the end the system is stopped as by Ctrl-C.  Run time: 25 s per robot.
+that do the same fixed work (the calibration loop) at the same time.  At the end the system is stopped as by Ctrl-C.  Run time: 25 s per
+robot.
 """
 
 from __future__ import annotations

@@ -54,7 +54,7 @@ def upper_body(role: Literal["field", "solid"] = "field", primitives: int | None
 
     Args:
         role: "field": the shapes cause repulsive forces; "solid": they do not.
-        primitives: number of shapes, the first ones; None: all 129.
+        primitives: the robot has only this number of shapes, the first ones in the file; None: all 129.
     """
     data = _file_content()
     joints = tuple(_joint_of(entry) for entry in data["joints"])

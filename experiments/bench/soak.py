@@ -5,7 +5,8 @@ Claim: after a warm-up of a tenth of the time no process is started again, the m
 threads stay the same, and the last tenth of the ticks takes at most 1.2 times as long as the first one after the warm-up.  The age of a
 command is the number of ticks since the tick that it answers.  The ages of the commands that the motors obey have the same distribution in
 both tenths: the distribution functions differ by at most .05.  Three agents learn on the motor model in lockstep: an hour of the robot
-takes minutes, and a command always answers the tick before.  With --scenario they can also run live, in real time.  The recorder runs.
+takes minutes, and a command always answers the tick before.  With --scenario they can also run live, in real time.  The recorder (the
+process that stores the messages of a run) runs, too.
 """
 
 from __future__ import annotations
@@ -89,10 +90,10 @@ def measure(settings: Settings) -> dict[str, Any]:
 
     Main keys: "processes", a dict from a process to a dict with "grown_mb", the growth of memory [MB], "more_files" and "more_threads", the
     additional open files and threads; "slower", wall time per second of the robot in the last tenth of the run, divided by that in the
-    first tenth after the warm-up; "ages", statistics of the ages of commands [ticks] in these tenths, under "first" and "last"; "apart",
-    the statistic of Kolmogorov and Smirnov: the largest difference between the distribution functions of the ages in both tenths, 0 to 1;
-    "restarted", list of the processes that were started again; "passed", whether growth, slowdown and "apart" are within their limits, and
-    no process was restarted.
+    first tenth after the warm-up; "ages", statistics of the ages of commands (ticks since the tick that a command answers) in these tenths,
+    under "first" and "last"; "apart", the statistic of Kolmogorov and Smirnov: the largest difference between the distribution functions of
+    the ages in both tenths, 0 to 1; "restarted", list of the processes that were started again; "passed", whether growth, slowdown and
+    "apart" are within their limits, and no process was restarted.
     """
     ticks, end, samples = _Ticks(), settings.hours * 3600.0, list[_Sample]()
     with Progress() as progress, tempfile.TemporaryDirectory() as scratch, running(Path(scratch), settings.scenario) as system:

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Start-up: import, first pose and start of the whole system, in time and memory.
+"""Start-up: times of the import, of the first evaluated pose and of the start of the whole system, and the memory of the system.
 
-Claim: `import mobee` takes at most 0.2 s, and the first pose with its contacts at most 0.3 s from the start of Python; the system of the
-scenario `default`, without its web page, is ready within 3 s and takes at most 500 MiB (PSS: memory that processes share counts once).  The
-processor times of the library are judged as multiples of the time to import NumPy, each in a fresh process, by turns.  The time of the
-system is converted to the time on the standard machine (calibration.py): two processes do the calibration loop at the same time.  Memory is
-judged in MiB.  Run time: half a minute.
+Claim: `import mobee` takes at most 0.2 s; import and first pose with its contacts take at most 0.3 s, without the start of Python itself.
+The system of the scenario `default`, without its web page, is ready within 3 s and takes at most 500 MiB (PSS: memory that processes share
+counts once).  The processor times of the library are judged as multiples of the time to import NumPy; in every round, each program runs in
+a new process.  The time of the system is converted to the time on the standard machine (calibration.py): two processes do the calibration
+loop at the same time.  Memory is judged in MiB.  Run time: half a minute.
 """
 
 from __future__ import annotations
@@ -49,8 +49,8 @@ _TIMED = (
 class Settings:
     """Settings of the benchmark.
 
-    `rounds`: number of imports of the library.  `systems`: number of starts of the system.  `seconds`: how long the system runs after each
-    start [s].
+    `rounds`: number of rounds, in each of which every program is timed once in a new process.  `systems`: number of starts of the system.
+    `seconds`: how long the system runs after each start [s].
     """
 
     rounds: int = 15
@@ -136,7 +136,8 @@ def mebibytes(launcher: int) -> dict[str, float]:
     """Return the memory [MiB] of a launcher and of each service that it has started, by name.
 
     `launcher`: process id.  The memory is the PSS: memory that n processes share counts 1/n for each.  The memory of a service includes
-    that of its standby process, which starts 10 s after the service is ready.  A process that has ended is absent.
+    that of its standby process, if it has one (a second process that waits to replace the first; it starts at least 10 s after the service
+    is ready).  A process that has ended is absent.
     """
     found: dict[str, float] = {}
     for pid in (launcher, *_children(launcher)):

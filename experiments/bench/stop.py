@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The emergency stop under floods: time until robot_sim obeys a stop from a file or from the bus, and time until a client is connected.
+"""The emergency stop under floods of messages, calls or connections: time until robot_sim obeys it, and until a client is connected.
 
 Claim: under each flood of `experiments.kit.live.floods`, and with a thousand idle connections, the stop is obeyed within 50 ms in 99 of 100
 cases, and no process ends.  The robot moves by the motor model at 100 Hz, with its three agents; each stop is sent by a new client.  On the
 machine of robot_sim, `mobee estop` and the web page write the stop into a file, the record of stops: this time begins before it is written.
-From other machines a stop can come only by the bus: this time begins when the client is connected.  Both times end at robot_sim's clock
-time in the first state of the head that has the gate state `estop`; this time is at most a tick after robot_sim has obeyed the stop.  Run
-time: about a minute for each flood.
+From other machines a stop can come only by the bus: this time begins when the client is connected.  Both times end at the time stamp, by
+robot_sim's clock, of the first state message of the head in which the gate (the last check before the motors) is in the state `estop`; this
+is at most a tick after robot_sim has obeyed the stop.  Run time: about a minute for each flood.
 """
 
 from __future__ import annotations
@@ -78,9 +78,9 @@ def measure(settings: Settings) -> dict[str, Any]:
     """Stop the robot under each flood of messages and return the result; raises LaunchFailed if the system or a flood ends early.
 
     Main keys: "floods", list with a dict for each flood: medians and 99th percentiles (endings "_p50" and "_p99") of the times [ms] from a
-    stop in the record ("stop_ms") or on the bus ("bus_stop_ms") until the robot reports it, and of the time to connect a client
-    ("connect_ms"); "late" and "late_by_bus", lists of the names of the floods with a 99th percentile above 50 ms by the record or by the
-    bus; "passed", whether no process ended and no flood is late by the record.  If the machine was busy, lateness does not count.
+    stop in the record of stops, a file ("stop_ms"), or on the bus ("bus_stop_ms") until the robot reports it, and of the time to connect a
+    client ("connect_ms"); "late" and "late_by_bus", lists of the names of the floods with a 99th percentile above 50 ms by the record or by
+    the bus; "passed", whether no process ended and no flood is late by the record.  If the machine was busy, lateness does not count.
     """
     rows = []
     with Progress() as progress, tempfile.TemporaryDirectory() as scratch, running(Path(scratch), "kinematic") as system:

@@ -51,7 +51,7 @@ def _pin_threads(cores: set[int]) -> None:
 
 
 def cores_text(core: int | None) -> str:
-    """Return a text for reports that says whether processor time was measured on one core.  `core`: its number, or None."""
+    """Return a text for reports that states whether processor time was measured on one core.  `core`: its number, or None."""
     return "of one core" if core is not None else "(not pinned to a core)"
 
 

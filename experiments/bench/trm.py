@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The pre-grasp roadmap of thesis figure 4.8 by least squares and by the evolution strategy: how fast, how complete, how valid."""
+"""Builds the pre-grasp roadmap of thesis figure 4.8 by least squares and by an evolution strategy, and measures both.
+
+The measures are the time, the coverage of the reachable points, and the share of valid vertices.
+"""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ class Requirement:
     aim: float | None = None
 
     def judge(self, result: Mapping[str, Any]) -> dict[str, Any]:
-        """Return a dict that says whether a result meets this requirement.  Raises KeyError if the result does not contain the number.
+        """Return a dict that states whether a result meets this requirement.  Raises KeyError if the result does not contain the number.
 
         Keys: "name"; "found", the number to which the requirement applies; "at_least", "at_most" and "aim", each only if it is not None;
         and "passed", whether the number is within the bounds (NaN is not).

@@ -76,7 +76,7 @@ def write_cell(folder: Path, cell: Cell, values: dict[str, Any], seconds: float)
     """Write the values of a cell to `folder`/cells/<name>.npz; an interruption leaves no incomplete file of this name.
 
     `folder`: folder of the run.  `values`: what the cell's run returned, by name.  `seconds`: duration of the cell's run.  Raises
-    InvalidValue for a value that is neither JSON nor an array, and OSError.
+    InvalidValue for a value that is neither JSON nor an array of numbers or text, and OSError if the file cannot be written.
     """
     arrays = {key: value for key, value in values.items() if isinstance(value, np.ndarray)}
     record = {"cell": asdict(cell), "seconds": seconds, "values": {key: value for key, value in values.items() if key not in arrays}}
@@ -108,10 +108,10 @@ def load_cells(folder: Path) -> dict[str, CellResult]:
 
 @contextmanager
 def reduced_cells(folder: Path, summary: Callable[[dict[str, Any]], dict[str, Any]]) -> Iterator[Path]:
-    """Yield a temporary folder with the finished cells of a run, in which `summary(values)` stands in place of the values of each cell.
+    """Yield a temporary folder with the finished cells (trials with one condition and one seed) of a run, with reduced values.
 
-    A context manager: the temporary folder is removed at the end.  `folder`: folder of the run.  `summary`: function that reduces the
-    values of a cell.
+    A context manager: the temporary folder is removed at the end.  `folder`: folder of the run.  `summary`: function that gets the values
+    of a cell and returns the reduced values, which are written in their place.
     """
     with tempfile.TemporaryDirectory(prefix="mobee-cells-") as reduced:
         for one in load_cells(folder).values():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Engines that run the cells of a sweep: processes of this machine, or a Ray cluster."""
+"""Engines that run the cells of a sweep (single runs, each with its settings and seed): processes of this machine, or a Ray cluster."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def cores() -> int:
 
 
 def in_processes(work: Work, cells: Sequence[Cell], jobs: int | None) -> Iterator[Done]:
-    """Run the cells in `jobs` processes of this machine, and yield the result of each as it finishes, in any order.
+    """Run the cells (single runs) in `jobs` processes of this machine, and yield the result of each as it finishes, in any order.
 
     With one job, the cells run in this process.  `work`: computes the values of a cell; a function of a module, so that other processes can
     import it.  `jobs`: None: one for each processor core.
@@ -155,7 +155,7 @@ def _worker_environment() -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Done:
-    """A cell that was run.
+    """A cell (one run of an experiment, with its settings and seed) that has ended.
 
     `seconds`: duration of the run.  `values`: what the run returned, by name; None if it failed.  `error`: the traceback, or how its
     process died; "" if the run succeeded.
@@ -173,7 +173,7 @@ class Done:
 
 
 def do(work: Work, cell: Cell) -> Done:
-    """Run `work` on a cell, and return its values and duration; an exception is caught, and its traceback is returned as `error`."""
+    """Run `work` on a cell (a single run), and return its values and duration; of an exception, the traceback is returned as `error`."""
     start = time.monotonic()
     try:
         values = work(cell)
@@ -187,7 +187,7 @@ class RayMissing(MobeeError):
 
 
 def on_ray(work: Work, cells: Sequence[Cell], jobs: int | None) -> Iterator[Done]:
-    """Run the cells on the Ray cluster that this machine belongs to, and yield the result of each as it finishes.
+    """Run the cells (single runs) on the Ray cluster that this machine belongs to, and yield the result of each as it finishes.
 
     Without a cluster, Ray runs the cells on this machine alone.  `work`: computes the values of a cell; a function of a module.  `jobs`:
     number of cells that run at the same time; None: one for each processor.  MoBeE must be installed on all machines of the cluster.

@@ -106,7 +106,10 @@ class PhysicsPlant:
             self.tick()
 
     def act(self, part: str, target: Array) -> Outcome:
-        """Set the part's attractor to `target` (n_part,) rad and run until it has settled or timed out, as in `mobee.plant.Plant.act`."""
+        """Move the part to `target` (n_part,) rad: run until it has settled or timed out, as in `mobee.plant.Plant.act`.
+
+        The target becomes the part's attractor, the posture to which the control law pulls.
+        """
         self._reaches.drop(part)
         self.controller.set_attractor(part, target)
         return self._settled(part)
@@ -116,10 +119,10 @@ class PhysicsPlant:
         self._reaches.present(target)
 
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
-        """Pull the marker to the presented target until the part has settled or timed out, as in `mobee.reach.ReachPlant.reach`.
+        """Pull the marker by a force to the presented target until the part settles or times out, as in `mobee.reach.ReachPlant.reach`.
 
-        `stay`: the attractor moves to the pose in which the reach ended; otherwise the attractor pulls the part back when the force has
-        ended.
+        `stay`: True: the part stays in the pose in which the force ended, which becomes its attractor (the posture to which the control law
+        pulls).  False: the attractor is unchanged and pulls the part back when the force has ended.
         """
         self._reaches.begin(part, marker, stay)
         end = self._settled(part)
@@ -157,7 +160,7 @@ class PhysicsPlant:
         self.run(seconds)
 
     def rest_at(self, q: Array) -> None:
-        """Set the attractor to q (n,) rad, and run until no motor is commanded to move, but not longer than 1.5 s."""
+        """Move to q (n,) rad as `press` does, but run until no motor is commanded to move, and not longer than 1.5 s."""
         self.controller.attractor = q
         self._calm()
 

@@ -63,7 +63,10 @@ def rounded(**values: Any) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """Base class of dataclasses that are records of a CSV file; their fields are of type str, int, float or bool."""
+    """Base class of dataclasses that are records of a CSV file; their fields are of type str, int, float or bool.
+
+    `PLACES`: number of decimals to which floats are rounded in a record; None: they are not rounded.
+    """
 
     PLACES: ClassVar[int | None] = 6  # of numbers in the record; None: all digits
 

@@ -72,7 +72,10 @@ def options_of(folder: Path, name: str) -> dict[str, Any]:
 
 
 def keep_options(folder: Path, name: str, options: Mapping[str, Any]) -> None:
-    """Write into config.json the options with which a run of the experiment `name` continues, if they differ from the recorded ones."""
+    """Record new options of a run of the experiment `name` that is continued: write them into its config.json, if they have changed.
+
+    `folder`: folder of the run.  `options`: all options of the run, by name.
+    """
     if options_of(folder, name) != json.loads(json.dumps(options, default=str)):
         write(folder / CONFIG, {"experiment": name, "options": dict(options)})
 

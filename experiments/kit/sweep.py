@@ -34,10 +34,10 @@ class CellsFailed(MobeeError):
 
 
 class Condition(NamedTuple):
-    """One setting of a sweep, under which a trial is run with each seed.
+    """One combination of settings in a sweep, with which a trial is run for each seed.
 
     `name`: unique in its sweep and safe as a file's name.  `settings`: JSON values by name.  `cost`: expected duration of a trial relative
-    to the others, in any unit.  `seeds`: seeds of this condition; (): those of the run.
+    to the others, in any unit.  `seeds`: seeds of this condition; (): those that the options of the run name.
     """
 
     name: str
@@ -69,7 +69,7 @@ def no_requirement() -> None:
 
 @dataclass(frozen=True)
 class Sweep:
-    """A `Method` of an experiment: one trial under each condition with each seed.
+    """The functions of an experiment that runs one trial under each condition with each seed (a `Method` of experiments.kit.experiment).
 
     Args:
         conditions: function that computes the conditions from the options of the run, among them the bool `quick`.

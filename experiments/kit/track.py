@@ -42,7 +42,7 @@ def require_tracker(name: str | None) -> None:
 
 
 class Scalars:
-    """Writes the event file of one run of TensorBoard into `folder`; TensorBoard then ignores earlier event files of this folder."""
+    """Writes an event file into `folder`, which is one run in TensorBoard; TensorBoard then ignores earlier event files of this folder."""
 
     def __init__(self, folder: Path) -> None:
         from tensorboardX import SummaryWriter

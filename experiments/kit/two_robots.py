@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The iCub and the Katana on its table in one model (thesis figure 4.5), both with fields, and the ball that the Katana carries."""
+"""The iCub and the Katana on its table as one robot model (thesis figure 4.5), and the ball that the Katana carries.
+
+Both have fields: larger volumes around the links, which cause repulsive forces.
+"""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Volumes of the iCub that are chosen by hand: force fields, and boxes that fit the meshes better than one primitive per link.
 
-Zero pose, root frame, [m]; the right arm mirrors the left in y.
+Positions are in m, in the root frame, with the robot in its zero pose.  Of the arms, only the left one's fields are listed; those
+of the right arm are their mirror images (y is negated).
 
 The fields are few spheres and capsules around the solids of each body section. They extend beyond the solids by 5 to 7 cm at hand and
 fingers, 5 cm at the forearm, 3 to 4 cm at elbow, torso and head, and 3 cm at the upper arm. At the flanks of pelvis and chest it is only

@@ -216,7 +216,7 @@ def add_mass(parent: ET.Element, joint: dict[str, Any], point: Array) -> None:
     """Add the mass that moves with a joint to the XML element `parent`; positions are written relative to `point` (3,) m, root frame.
 
     Fingers and eyes get no mass: their values in icub-models, 0.01 kg and 0.001 kg m^2 each, are placeholders.  The simulator loads another
-    model of icub-models, without fingers and eyes; hand and head have the same mass there.
+    model of icub-models, which has no fingers and eyes; its hands and head have the masses that are written here.
     """
     if "_hand_" in joint["name"] or "eye" in joint["name"]:
         return

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Write mobee/robot/robots/icub_2014.xml, the iCub model published with MoBeE in 2014.
 
-Source: the entries mobee_original (numbers of kailfrank/MoBeE, no text taken) and shoulder_constraints.mobee_2014 of DATA.json.
+Source: the entries mobee_original (only numbers, no text, of the repository kailfrank/MoBeE) and shoulder_constraints.mobee_2014 of
+DATA.json.
 
 Usage: python -m experiments.robots.write_icub_2014 DATA.json [OUT.xml]
 """
@@ -128,10 +129,10 @@ def add_node(parent: ET.Element, tree: Tree, node: dict[str, Any]) -> None:
 
 
 def joint_element(parent: ET.Element, tree: Tree, node: dict[str, Any], axis: Array) -> ET.Element:
-    """Add a joint with its axis (3,), motor and interval to the XML element `parent`, and return the new element.
+    """Add a joint with its axis (3,), motor and limits to the XML element `parent`, and return the new element.
 
-    The joint moves a link.  If the iCub v2.5 (models.icub_v2_5 in the JSON data) has a joint with the same name, the link is named as the
-    one that that joint moves, as in icub.xml; otherwise it is named "<joint>_link".
+    The link that the joint moves gets its name from the iCub v2.5 (models.icub_v2_5 in the JSON data), as in icub.xml: the name of the link
+    that the joint with the same name moves there.  If there is no such joint, the name is "<joint>_link".
     """
     name, motor = tree.joint_name(node), tree.axis[node["motor"]]
     here = element(parent, "joint", name=name, moves=tree.links.get(name, f"{name}_link"), motor=motor, **vector("x y z", axis))

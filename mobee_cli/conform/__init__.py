@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mobee conform`: acts as the controller of a robot_sim, and reports which rules of the bus contract it breaks."""
+"""`mobee conform`: tests whether a robot_sim keeps the rules of the bus contract.
+
+It acts as the controller of the robot_sim. The contract defines messages and calls, and how robot_sim answers them (docs/hardware.md).
+"""
 
 from __future__ import annotations
 

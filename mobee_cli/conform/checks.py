@@ -2,6 +2,8 @@
 """The rules of the bus contract that every robot_sim must keep, each with a check (docs/hardware.md).
 
 A check is a function of a player, which acts as the controller, and of the part that is tested. It raises Broken if the rule is not kept.
+The process that takes a part is its owner. The part is then in hold: it stands still. When the owner has armed it, the part follows the
+owner's commands.
 """
 
 from __future__ import annotations
@@ -42,7 +44,7 @@ class Check:
     """The check of one rule of the contract, which every robot_sim must keep.
 
     `name`: name of the check. `rule`: the requirement, as text. `test`: function that tests the rule with a part of the robot, and raises
-    Broken if the robot breaks it. `moves`: whether the test arms the part, so that it may move.
+    Broken if the robot breaks it. `moves`: whether the test arms the part; an armed part follows commands, so that it may move.
     """
 
     name: str
@@ -133,7 +135,7 @@ def positions(player: Player, part: str) -> None:
 
 
 def ownership(player: Player, part: str) -> None:
-    """Test that take, arm and release work, and that no other process can take an owned part; raises Broken otherwise.
+    """Test that the calls take, arm and release work, and that no other process can take an owned part; raises Broken otherwise.
 
     Also tested: every take returns a larger epoch (number of the ownership) than all before, and an older epoch is refused.
     """
@@ -152,7 +154,7 @@ def ownership(player: Player, part: str) -> None:
 
 
 def hold(player: Player, part: str) -> None:
-    """Test that a part does not move when it receives commands before it is armed; raises Broken otherwise."""
+    """Test that a part in hold, which has an owner but is not armed, does not move on commands; raises Broken otherwise."""
     player.take(part)
     start = player.q(part)
     player.keep(part, "velocity", lambda: _speed(player, part), MOTION)
@@ -183,9 +185,9 @@ def obeys(player: Player, part: str) -> None:
 
 
 def refuses(player: Player, part: str) -> None:
-    """Test that robot_sim ignores invalid commands, and commands that answer an old tick; raises Broken otherwise.
+    """Test that robot_sim ignores invalid commands, such as one computed from a tick that is too old; raises Broken otherwise.
 
-    `player`: the connection with robot_sim. `part`: part that the checks with commands use.
+    `player`: the connection with robot_sim. `part`: part to which the commands are sent.
     """
     n = len(player.robot.part(part))
     still, nan = np.zeros(n), np.full(n, math.nan)
@@ -212,7 +214,10 @@ def refuses(player: Player, part: str) -> None:
 
 
 def watchdog(player: Player, part: str) -> None:
-    """Test that a part goes into hold when its commands stop, and then must be armed again before it moves; raises Broken otherwise."""
+    """Test that a part goes into hold when its commands stop; raises Broken otherwise.
+
+    In hold the part brakes and stands still. It must not move again before its owner has armed it again.
+    """
     with player.armed(part):
         player.keep(part, "velocity", lambda: _speed(player, part), MOTION)
         if not player.until(lambda: player.status(part).gate == "hold", 1e-3 * TTL + STOP_TIME):
@@ -225,7 +230,7 @@ def watchdog(player: Player, part: str) -> None:
 
 
 def owner_gone(player: Player, part: str) -> None:
-    """Test that a part goes into hold when the liveliness token of its owner disappears; raises Broken otherwise."""
+    """Test that a part goes into hold (stands still) when the liveliness token of its owner disappears; raises Broken otherwise."""
     _hold_without(player, [part], "controller", owner=True)
 
 
@@ -239,7 +244,10 @@ def model_gone(player: Player, part: str) -> None:
 
 
 def emergency_stop(player: Player, part: str) -> None:
-    """Test that an emergency stop stops all parts, and that no part can be armed before the stop is reset; raises Broken otherwise."""
+    """Test that an emergency stop stops all parts, and that the part cannot be armed before the stop is reset; raises Broken otherwise.
+
+    Only an armed part follows commands.
+    """
     with player.armed(part):
         player.keep(part, "velocity", lambda: _speed(player, part), MOTION)
         player.service.bus.publisher(EStop).put(set=True, source="conform", reason="test of the emergency stop")

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What `mobee play` and `mobee learn` have in common: the choice of robot and agents (setup), its files, and offline learning."""
+"""Code that `mobee play` and `mobee learn` share: the setup (a robot with its agents), the files of a setup, and offline learning."""

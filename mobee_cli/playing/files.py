@@ -30,7 +30,10 @@ class Files:
 
     @property
     def robot(self) -> Path:
-        """The path of the derived robot as zero-position XML. For a shipped robot this file does not exist."""
+        """The path of the robot file with the parts that were derived for the agents, in zero-position XML (mobee's own format).
+
+        For a shipped robot this file does not exist.
+        """
         return self.store.with_suffix(".xml")
 
     @property

@@ -78,8 +78,8 @@ class Learning:
     def report(self) -> str:
         """Return one line with the progress of learning.
 
-        It says how many state-actions were tried, how many of these have missed their goal at least once, and which object was touched
-        most.
+        The line contains the number of state-actions that were tried, the number of those that missed their goal at least once, and the
+        object that was touched most.
         """
         tried = sum(int((agent.model.tries > 0).sum()) for agent in self.agents)
         every = sum(agent.space.state_actions for agent in self.agents)

@@ -1,2 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Plays a recording again on the page or into a service in lockstep, and compares it with another recording."""
+"""Replays a recording: on a monitor's page, or into its controller or model.
+
+A replayed service runs in lockstep (every tick waits for its answer), and its messages are compared with the recorded ones. Two recordings
+can be compared, too.
+"""

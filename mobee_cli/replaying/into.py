@@ -78,9 +78,9 @@ class Result:
 
 
 def replay_into(stage: Stage, run: Iterable[TickOf], last: int) -> Result:
-    """Play the ticks of a run into the service on a stage, up to tick `last` or the first difference, and return the result.
+    """Play the ticks of a run into a service, up to tick `last` or the first difference, and return the result.
 
-    Raises MobeeError if the run cannot be played, or the service does not answer.
+    `stage`: a separate bus, on which only this service runs. Raises MobeeError if the run cannot be played, or the service does not answer.
     """
     begin = time.monotonic()
     replay = _Replay(stage, ROLES[stage.who])

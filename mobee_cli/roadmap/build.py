@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mobee roadmap build`: builds a roadmap, a graph of poses that satisfy a task's costs and are spread over its task space."""
+"""`mobee roadmap build`: builds a roadmap, a graph of poses for a task.
+
+Each pose is within the tolerances of the task's cost functions. The poses are spread over the task space.
+"""
 
 from __future__ import annotations
 

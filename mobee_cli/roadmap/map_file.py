@@ -57,7 +57,8 @@ def start_of(trm: Roadmap, given: list[float] | None) -> Array:
 
     `given`: None: the path begins at the robot's home. As many numbers as the task has coordinates: these are task coordinates, and the
     path begins at the nearest vertex of the roadmap. n numbers: angles of all motors [rad]. Raises UserError for another count of numbers
-    or an angle beyond the limits, InvalidValue if no vertex is within 1.5 spacings of the task coordinates.
+    or an angle beyond the limits, InvalidValue if no vertex is within 1.5 spacings (distances between neighbouring vertices) of the task
+    coordinates.
     """
     robot = trm.model.robot
     if given is None:

@@ -138,7 +138,8 @@ def held_off(trm: Roadmap, path: dict[str, Any], played: Played, gains: Gains) -
     """Return the motor that ended farthest from its goal, and the strongest constraint force on it in the last pose.
 
     Keys of the result: "farthest": name of the motor, one that the path moves. "held_by": "its limit", "a constraint of the robot" or "a
-    field in contact"; None if no such force exceeds 0.5 rad/s^2. `path`: as returned by `mobee_cli.roadmap.query.find_path`.
+    field in contact" (a field is a volume around a link that causes repulsive forces); None if no such force exceeds 0.5 rad/s^2. `path`:
+    as returned by `mobee_cli.roadmap.query.find_path`.
     """
     off = np.abs(played.q[-1] - path["poses"][-1]) * (np.ptp(path["poses"], axis=0) > 0.0)
     motor = int(off.argmax())

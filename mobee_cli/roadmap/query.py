@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mobee roadmap query`: finds a path through a roadmap to a place."""
+"""`mobee roadmap query`: finds a path through a roadmap to a task-space goal."""
 
 from __future__ import annotations
 

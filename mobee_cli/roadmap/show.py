@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mobee roadmap show`: describes a roadmap, and draws the positions of a marker in all its poses."""
+"""`mobee roadmap show`: describes a roadmap, and draws its poses as points.
+
+A point is the position of a marker (a named point on a link) in one pose of the roadmap.
+"""
 
 from __future__ import annotations
 

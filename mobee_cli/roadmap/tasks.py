@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mobee roadmap tasks`: lists the shipped tasks. Also loads the task of a roadmap, shipped or from a Python file."""
+"""`mobee roadmap tasks`: lists the shipped tasks of roadmaps.
+
+A task consists of the model, the costs and the task space from which a roadmap (graph of poses) is built. This module also loads a task,
+shipped or from a Python file.
+"""
 
 from __future__ import annotations
 

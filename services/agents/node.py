@@ -45,10 +45,10 @@ class Work:
         service.on_request(keys.service_rpc(service.who, "resume"), Empty, self._resume)
 
     def run(self, resumed: str, enough: Callable[[], bool], step: Callable[[], None]) -> None:
-        """Call `step` until `enough()` returns True, and answer calls between the steps.
+        """Call `step` until `enough()` returns True, and answer the calls of other processes between the steps.
 
-        If an action is interrupted, this is counted and published as an event, and the next step begins. `resumed`: text of an event which
-        is published first, and says that the agent continues from stored transitions; empty: the agent starts without any.
+        If `step` raises ActionInterrupted, this is counted and published as an event, and the next step begins. `resumed`: text of an event
+        that is published first, if the agent continues from stored data; empty: no event, because there are no stored data.
         """
         self._service.ready()
         if resumed:

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The live plant of an agent whose states contain the place of an object: an action ends when the object is seen at rest in its area."""
+"""The live plant (the running robot) of an agent whose states contain the position of an object.
+
+An action ends when the object is seen at rest in its area, a rectangle in x and y that the agent's settings define.
+"""
 
 from __future__ import annotations
 
@@ -26,11 +29,12 @@ PATIENCE = 10.0  # s of the robot's clock after which the simulator is asked aga
 
 
 class ObjectPlant(PerceivingPlant):
-    """A live plant that perceives one object, and completes each action by looking at this object.
+    """A live plant that perceives one object: an action ends only when vision has seen this object at rest in its area.
 
-    Pictures that were taken before the end of the motion do not count. If the object is not seen, the part moves to the posture `aside` of
-    the settings, and the action ends there. If it is still not seen in its area, it has fallen or has left the area. The simulator or a
-    person puts it back, and the action ends when the object is seen again. So an outcome always contains what was seen after the action.
+    Pictures that were taken before the end of the motion do not count. If the object is not seen in the area, the part moves to the posture
+    `aside` of the settings, and the action ends there. If it is still not seen in its area, it has fallen or has left the area. The
+    simulator or a person puts it back, and the action ends when the object is seen again. So an outcome always contains what was seen after
+    the action.
 
     Args:
         service: the service of the agent.
@@ -55,7 +59,8 @@ class ObjectPlant(PerceivingPlant):
     def measure(self, part: str) -> Array:
         """Wait until the object is seen in its area, then return the part's motor positions (n_part,) rad.
 
-        If the object is not seen within 2 s (LOOK) of the robot's clock, the part first moves to the posture `aside`.
+        If the object is not seen within 2 s (LOOK) of the robot's clock, the part moves to the posture `aside` of the settings, and the
+        wait continues there.
 
         Implements `mobee.plant.Plant.measure`.
         """
@@ -64,7 +69,7 @@ class ObjectPlant(PerceivingPlant):
         return self.plant.measure(part)
 
     def act(self, part: str, target: Array) -> Outcome:
-        """Set the part's attractor to `target` (n_part,) rad, wait until the part settles or times out, then look at the object.
+        """Set the part's attractor to `target` (n_part,) rad, wait until the part settles or times out, then until the object is seen.
 
         Implements `mobee.plant.Plant.act`. The outcome contains the position of the object after the action, and the posture from which it
         was seen.

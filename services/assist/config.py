@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Settings of the torso assist."""
+"""Settings of the torso assist, which moves the torso so that an arm can reach a target well."""
 
 from __future__ import annotations
 

@@ -21,9 +21,10 @@ MOVED = 0.03  # m by which the target must have moved for another choice
 
 
 class AssistNode:
-    """Moves the part slowly to the posture from which the arm reaches the target best.
+    """Moves a part, usually the torso, slowly to the posture from which an arm reaches a target best.
 
-    A new posture is chosen when the target has moved by more than 3 cm and rests again.
+    The target is an object that vision finds, or a marker (named point of a link). A new posture is chosen when the target has moved by
+    more than 3 cm and has then been at rest for 1 s.
     """
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:

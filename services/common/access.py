@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The access list of a secured router, in Zenoh's form, from the table of who may do what (bus_schema/authority.py)."""
+"""The access list of a secured router, in Zenoh's form, made from the rights of each party (bus_schema/authority.py)."""
 
 from __future__ import annotations
 

@@ -68,11 +68,11 @@ class Scene:
 
 
 class Behaviour:
-    """Runs a behaviour: in each step, moves the attractor of its part (the posture to which the part moves) as the function `step` says.
+    """Runs a behaviour: in each step, sets the attractor of its part (the posture to which the part moves) to the result of `step`.
 
-    `step(scene)`: returns the attractor (n_part,) rad and its velocity (n_part,) rad/s. `reset()`: ends the present motion. If the target
-    has no new position for the time `patience` of the settings, the part stays where it is; if `watches_last_place` is True, the behaviour
-    continues instead as if the target were at rest at its last position.
+    `step(scene)`: returns the attractor (n_part,) rad and its velocity (n_part,) rad/s for a `Scene`. `reset()`: ends the present motion.
+    If the target has no new position for the time `patience` of the settings, the part stays where it is; if the argument
+    `watches_last_place` is True, the behaviour continues instead as if the target were at rest at its last position.
     """
 
     def __init__(

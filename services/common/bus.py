@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Typed streams on a session: delivery classes, headers of sent messages, checks of received ones, counts of refused ones."""
+"""Typed streams on a session: headers of sent messages, checks of received ones, counts of refused ones.
+
+Each stream has a delivery class, which determines how its messages are queued, dropped and prioritised (bus_schema/stream.py).
+"""
 
 from __future__ import annotations
 
@@ -188,7 +191,7 @@ class Bus:
         Args:
             cls: type of the messages; its `stream` contains key and delivery class.
             name: value of the variable in the stream's key, such as the name of the part; empty: the key has no variable.
-            delivery: delivery class of the stream; None: that of the type `cls`.
+            delivery: delivery class of the stream (how messages are queued, dropped and prioritised); None: that of the type `cls`.
         """
         return Publisher(self, cls.stream.key(name), cls, delivery or cls.stream.delivery)
 

@@ -86,7 +86,8 @@ class BusFollower(BusPlant):
             progress: called with the share of the rows, 0 to 1, that have been set.
 
         Raises ActionInterrupted if a part is in hold (it stands still and follows no commands) or was taken by another service, if the
-        controller ends, if robot_sim starts a new run, or if the robot's clock stands still. Call `let_go` afterwards.
+        controller ends, if robot_sim starts a new run, if the robot's clock stands still, or if a part does not rest within 60 s
+        (REST_TIMEOUT) after the last row. Call `let_go` afterwards.
         """
         begun, run, last = self._now, self._runs, len(attractors) - 1
         self._seen.clear()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The live plant: acts and reaches with a part through controller and model on the bus."""
+"""The live plant (the running robot, in the form that agents need): acts and reaches with parts through controller and model on the bus."""
 
 from __future__ import annotations
 
@@ -156,12 +156,13 @@ class BusPlant:
         return self._reaches.objects()
 
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
-        """Pull the marker to the presented target by a force until the part settles or times out, then end the force; return the outcome.
+        """Pull a marker (a named point on a link) to the presented target by a force; return the outcome.
 
-        Then the attractor pulls the part back, or, with `stay`, the part stays where the force ended. Implements
-        `mobee.reach.ReachPlant.reach`. Raises InvalidValue if no target is presented or the part does not move the marker;
-        ActionInterrupted if the part is in hold (it stands still and follows no commands) or has a fault; if robot_sim starts a new run; if
-        the controller ends; or if the controller gives the part's goal to another service.
+        The force ends when the part has settled or timed out. Then the attractor pulls the part back, or, with `stay`, the part stays where
+        the force ended. Implements `mobee.reach.ReachPlant.reach`. Raises UnknownName for an unknown marker; InvalidValue if no target is
+        presented or the part does not move the marker; ActionInterrupted if the part is in hold (it stands still and follows no commands)
+        or has a fault; if robot_sim starts a new run; if the controller ends; or if the controller gives the part's goal to another
+        service.
         """
         self.robot.marker(marker)
         sent = self._perform(part, "reach", ReachFor, marker=marker, stay=stay, **self._reaches.asked())
@@ -230,7 +231,10 @@ class BusPlant:
                     return replace(again, first_k=sent.first_k, touched=sent.touched | touched)
 
     def release(self, part: str) -> None:
-        """Release the goal of the part, if this service owns it; raises services.common.rpc.CallFailed."""
+        """Release the goal of the part, if this service owns it.
+
+        Raises services.common.rpc.CallFailed if the controller does not answer or refuses the release.
+        """
         epoch = self._epochs.pop(part, None)
         if epoch is not None:
             self._service.call(keys.goal(part, "release"), WithEpoch, Done, epoch=epoch)
@@ -248,9 +252,9 @@ class BusPlant:
         self._is_resting = False
 
     def idle(self) -> bool:
-        """Return whether this plant rests, that is, `rest` was called and `resume` was not called since.
+        """Return whether this plant rests: `rest` was called, and `resume` was not called since.
 
-        If it rests, first wait until the rest ends, for at most 0.2 s (RETRY_PERIOD).
+        If it rests, the method first waits for a call of `resume`, for at most 0.2 s (RETRY_PERIOD), and returns the state after this wait.
         """
         if self._is_resting:
             self._service.check_router()
@@ -258,7 +262,10 @@ class BusPlant:
         return self._is_resting
 
     def pause(self, seconds: float) -> None:
-        """Run handlers for `seconds` of real time; raises ActionInterrupted if `rest` was called, or at a new run of robot_sim."""
+        """Handle messages and calls for `seconds` of real time.
+
+        Raises ActionInterrupted if `rest` was called, or if robot_sim started a new run.
+        """
         run = self._runs
         self._service.check_router()
         self._wait(lambda: self._is_resting, seconds)

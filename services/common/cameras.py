@@ -38,7 +38,7 @@ class CameraConfig(ServiceConfig, frozen=True, kw_only=True):
 
 
 def require_cameras(robot: Robot, cameras: dict[str, Camera], count: int) -> None:
-    """Raise InvalidValue if the robot has fewer than `count` cameras; the message says how to add one.
+    """Raise InvalidValue if the robot has fewer than `count` cameras; the message explains how to add one.
 
     `cameras`: the robot's cameras by name.
     """

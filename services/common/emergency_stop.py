@@ -75,7 +75,10 @@ class StopRecord:
         return self._path
 
     def create(self) -> None:
-        """Make the file of the record, which then says that the robot is released; an existing file stays. Raises OSError."""
+        """Make the record's file, with the content that the robot is released; an existing file stays.
+
+        Raises OSError if the file or its folder cannot be made.
+        """
         if not self._path.exists():
             self._path.parent.mkdir(parents=True, exist_ok=True)
             self.release()
@@ -91,7 +94,7 @@ class StopRecord:
     def read(self) -> Stop | None:
         """Return the recorded stop; None if the file records that the robot is released.
 
-        If the file does not exist or cannot be read, return a stop whose reason says that the record cannot be read.
+        If the file does not exist or cannot be read, return a stop with the reason that the record cannot be read.
         """
         try:
             found = json.loads(self._path.read_bytes())
@@ -102,9 +105,10 @@ class StopRecord:
             return Stop("robot_sim", f"the record of emergency stops {self._path} cannot be read ({type(error).__name__})")
 
     def new_stop(self) -> Stop | None:
-        """Return what `read` returns if the file has changed since the last call, or at the first call; otherwise None.
+        """Return the stop that the file records (as `read`), if the file has changed since the last call, and at the first call.
 
-        If the file does not exist, the result is None too: the launcher removes the file when its run ends.
+        Returns None if the file has not changed, records that the robot is released, or does not exist: the launcher removes the file when
+        its run ends.
         """
         try:
             found = self._path.stat()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Starts a service with its log and its robot, and ends it with one line on bad input."""
+"""Starts a service with its log and its robot; on bad input, prints one line on standard error and ends the service."""
 
 from __future__ import annotations
 

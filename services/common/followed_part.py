@@ -66,10 +66,11 @@ class FollowedPart:
         return found
 
     def take(self) -> None:
-        """Ask the controller for the goal of the part, if it is free or belongs to a behaviour; at most once per RETRY_PERIOD (0.5 s).
+        """Ask the controller for the goal of the part (the right to set its attractor), at most once per RETRY_PERIOD (0.5 s).
 
-        `is_owned` becomes True when the controller has given the goal to this service. If the goal belongs to another behaviour, the
-        controller decides by the ranks of the two.
+        The call is not made while the goal belongs to a service that is not a behaviour (assist or gaze). If it belongs to the other
+        behaviour, the controller gives it to this service only if this service has the higher rank (services/controller/precedence.py).
+        `is_owned` becomes True when this service has got the goal.
         """
         now, motion = time.monotonic(), self._motions.get(self._part)
         if motion is None or motion.owner not in ("", self._service.who, *BEHAVIOURS):

@@ -69,7 +69,11 @@ class Identity:
         return f"unixsock-stream/{path}" if os.name == "posix" and len(os.fsencode(path)) <= LONGEST_SOCKET else ""
 
     def endpoints(self, endpoint: str) -> list[str]:
-        """Return the addresses at which this identity can connect to the secured router that listens at `endpoint`, the best one first."""
+        """Return the addresses at which this identity can connect to the secured router that listens at `endpoint`.
+
+        They are in the order of preference: first the router's Unix socket if there is one and this process is a local `operator`, then
+        `endpoint` with TLS.
+        """
         socket = self.socket(endpoint) if self.name == OPERATOR and is_local(endpoint) else ""
         here = socket and Path(socket.partition("/")[2]).exists()
         return [socket, secured(endpoint)] if here else [secured(endpoint)]
@@ -88,8 +92,8 @@ class Identity:
     def settings(self) -> dict[str, object]:
         """Return the settings of Zenoh with which this process shows its certificate, and accepts only certificates of the same authority.
 
-        A client does not compare the name in the router's certificate with the name of the host. It need not, because of all certificates
-        of the authority only the router's is valid for a server.
+        A client does not compare the name in the router's certificate with the name of the host. This is not necessary, because no other
+        certificate of the authority is valid for a server.
         """
         listens = self.name == ROUTER
         own = {"listen_certificate": str(self.certificate), "listen_private_key": str(self.key)}

@@ -46,8 +46,9 @@ class Listener:
     def on_newest(self, cls: type[_M], handler: Callable[[_M], None], name: str = "*", *, any_run: bool = False) -> None:
         """Call `handler` with the newest message of a stream; a message that still waits is replaced by a newer one.
 
-        A participant in lockstep handles every message instead. `name`: value of the variable in the stream's key, such as the name of a
-        part; "*": all values. `any_run`: True: accept also messages of other runs of robot_sim; False: refuse them.
+        In lockstep (every tick waits for the answers of all participants) a participant handles every message instead. `name`: value of the
+        variable in the stream's key, such as the name of a part; "*": all values. `any_run`: True: accept also messages of other runs of
+        robot_sim; False: refuse them.
         """
         part = part_of(cls, name)
         self._subscribe(cls.stream.keys(name), self._newest(lambda sample: self._deliver(cls, sample, handler, part, any_run)))
@@ -126,9 +127,10 @@ class Listener:
         self._on_time(Tick, handler)
 
     def on_turn(self, handler: Callable[[Turn], None]) -> None:
-        """Call `handler` with each `Turn` message for this service, which says that the present tick waits for the service's answer.
+        """Call `handler` with each `Turn` message for this service, a request to answer the present tick.
 
-        Use this in lockstep instead of `on_clock` if the service needs only these ticks.
+        Use this in lockstep (every tick waits for the answers of all participants) instead of `on_clock` if the service needs only the
+        ticks that wait for its own answer.
         """
         self._on_time(Turn, handler, self.bus.who)
 

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Lockstep: tick k + 1 begins when all participants have answered tick k (docs/bus.md).
 
-A participant has a `Participant` and calls `done(k)` after it has published all its messages for tick k; the owner of the clock waits at
-a `Barrier`.  In free mode `done` does nothing.
+A participant (service for which every tick waits) has a `Participant`, and calls `done(k)` after it has published all its messages for
+tick k. robot_sim, which publishes the ticks, waits with a `Barrier`; so does the port filter for its clients. In free mode the ticks
+follow real time, and `done` does nothing.
 """
 
 from __future__ import annotations
@@ -19,7 +20,10 @@ TEST_DELAY = "MOBEE_TEST_DELAY_MS"  # environment variable: longest random sleep
 
 
 class Participant:
-    """Sends robot_sim a service's answers to ticks in lockstep (every tick waits for all participants). In free mode it does nothing."""
+    """Sends robot_sim a service's answers to ticks in lockstep, in which every tick waits for all participants.
+
+    In free mode, in which the ticks follow real time, it does nothing.
+    """
 
     def __init__(self, service: Service) -> None:
         self._locked = service.keeps_step = service.locked

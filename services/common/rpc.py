@@ -30,7 +30,7 @@ class CallFailed(Exception):
     """Raised for a call without a valid reply.
 
     `code`: the code with which the server has refused the call, "no_answer" if no reply came in time, or "bad_answer" if the reply does not
-    match its struct.
+    match its type.
     """
 
     def __init__(self, code: str, text: str) -> None:

@@ -207,9 +207,9 @@ class Service(Listener):
     def ready(self) -> None:
         """Declare the liveliness token of this service; call this after all subscriptions and calls are declared.
 
-        There must be only one robot_sim, model, controller and port_filter, because other processes would obey each of two. If this is one
-        of these services and no launcher has started it, the method first asks whether another process of the same name is ready. If so,
-        it raises SystemExit.
+        Only one process of each of the services robot_sim, model, controller and port_filter may run, because others would follow the
+        messages of both. If this is one of these services and no launcher has started it, the method first asks whether another process of
+        the same name is ready. If so, it raises SystemExit.
         """
         if self.who in ONLY_ONE and not self._launcher:
             self._require_no_other()

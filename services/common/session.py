@@ -80,11 +80,11 @@ def end_unreceived(endpoint: str, lease: float) -> None:
 
 
 def receive_together(sockets: Iterable[int], count: int) -> None:
-    """Let Linux wake this process for data of a connection only when `count` bytes wait there; other systems change nothing.
+    """Let Linux wake this process for data of a connection only when `count` bytes wait there; on other systems nothing is changed.
 
     `sockets`: file descriptors of the connections, as `sockets_at` returns them. `count` = 1: the process is woken for any data, and at
-    once if data already waits. A caller that has set a larger `count` must set 1 several times per lease, because a connection from which
-    nothing is received for a whole lease counts as dead.
+    once if data already waits. A caller that sets a larger `count` must call this again with `count` = 1 several times per lease, so that
+    waiting data is received: a connection from which nothing is received for a whole lease counts as dead.
     """
     if sys.platform == "linux":
         _set_option(sockets, socket.SOL_SOCKET, socket.SO_RCVLOWAT, count)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The default world of a robot, its objects as messages hold them, and a hash of the robot that processes compare."""
+"""The default world of a robot, the objects of a world in the form of messages, and a hash by which processes compare their robots."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The action of one part: owner, target, status."""
+"""The action of one part (a motion that a client has started), its status and its owner."""
 
 from __future__ import annotations
 

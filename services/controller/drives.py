@@ -80,8 +80,8 @@ class Drives:
     def watch_stop(self, parts: Mapping[str, PartStatus]) -> None:
         """Read emergency stops from the bus; after a stop no part is armed until the safety gates show that the stop was reset.
 
-        This method publishes the stop again every 0.1 s until robot_sim obeys it, and forgets it when it was reset at robot_sim. `parts`:
-        the newest status of each part.
+        This method publishes the stop again every 0.1 s until robot_sim obeys it. It discards the stop when robot_sim has obeyed it and no
+        gate is in the state "estop" any more. `parts`: the newest status of each part.
         """
         now = time.monotonic()
         for message in self._line.take():

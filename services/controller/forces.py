@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The control law's inputs from outside: the forces of the model, checked, and user-defined terms."""
+"""Inputs of the control law from outside: user-defined terms, and the constraint forces of the service `model` after a check.
+
+Constraint forces push the robot away from motor limits and contacts.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +28,7 @@ MAX_STATE_AGE = 100_000_000  # ns; a part whose state is older is not under cont
 
 
 class ModelForces:
-    """The newest valid forces of the model.
+    """The newest valid constraint forces that the service `model` has published; they push away from motor limits and contacts.
 
     `message`: the newest valid `Forces` message; None: there is none in this run. `vectors`: the forces in this message, (n,) rad/s^2 each.
     """
@@ -37,7 +40,7 @@ class ModelForces:
         self.vectors: Forces  # each term (n,) rad/s^2, of `message`
 
     def take(self, message: ForcesMessage) -> str:
-        """Store the forces of a message if it is valid; return the reason if it is refused, otherwise an empty text."""
+        """Store the forces of a message of the service `model` if it is valid; return the reason of a refusal, else an empty text."""
         why = self._refusal(message)
         if not why:
             self.message, self.vectors = message, Forces(**{name: np.array(row) for name, row in message.terms.items()})
@@ -114,8 +117,9 @@ class PublishedContacts:
         """Return the published contacts for one pose q (1, n) rad, and the projection of field contacts to the motors, (1, n) m^2/rad.
 
         A field is a volume around a link, larger than the link; its contacts cause repulsive forces. The projection is the sum of
-        J^T (depth * normal) over these contacts. `snapshot` (the world) and `reaching` (the hands that reach) are not used, because the
-        model service has already used its own when it computed the contacts.
+        J^T (factor * depth * normal) over these contacts; the factors (1 if `robot.least_lever` is 0) are those of
+        `mobee.model.levers.push_factors`. `snapshot` (the world) and `reaching` (the hands that reach) are not used, because the model
+        service has already used its own when it computed the contacts.
         """
         projection, numbers, reals = np.zeros_like(q), list[tuple[int, ...]](), list[list[float]]()
         for at, contact in enumerate(self._contacts):

@@ -65,7 +65,10 @@ class RobotLaw:
         self.q, self._last_tick = q, None
 
     def count_ticks(self, k: int) -> int:
-        """Return the number of ticks from the k of the previous call of this method to this k, at least 1; 1 at the first call in a run."""
+        """Return the number of ticks since the previous call of this method, at least 1; 1 at the first call in a run.
+
+        `k`: number of the present tick.
+        """
         ticks = max(k - self._last_k, 1) if self._last_k >= 0 else 1
         self._last_k = k
         return ticks
@@ -159,7 +162,10 @@ class RobotLaw:
     # Reaches and forces of clients
 
     def reach(self, part: str, marker: str, target: ReachTarget) -> None:
-        """Begin to pull a marker to a target by forces on the part; raises InvalidValue or UnknownName if the part cannot reach for it."""
+        """Begin to pull a marker (a named point on a link) to a target by forces on the part.
+
+        Raises UnknownName for an unknown part or marker, InvalidValue if no motor of the part that may move moves the marker.
+        """
         self._law.reach_toward(part, marker, target)
 
     def end_reach(self, part: str) -> None:

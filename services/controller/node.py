@@ -33,8 +33,8 @@ from services.controller.reaches import Reaches
 class ControllerNode:
     """Waits for the forces of a tick, steps the control law, and commands the parts that are under control.
 
-    Each object is changed only by its own methods: `RobotLaw` keeps the law's state, `Action` the goal and status of one part, `Drives` the
-    ownership of the motors at robot_sim, `Reaches` the reaches in progress.
+    The state is in objects that only their own methods change: `RobotLaw` keeps the law's state, `Action` the goal and status of one part,
+    `Drives` the ownership of the motors at robot_sim, `Reaches` the reaches in progress.
     """
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:

@@ -39,9 +39,8 @@ class Counters:
         """Return the counts of the measurement by name, for the call `stat`.
 
         "ticks": number of control steps. "late_forces": number of steps that were made before the model's forces of the tick had arrived.
-        "held_ticks": for each part, the number of ticks in which it did not follow the control law; the sum of these. "long_gaps": number
-        of steps that came more than 3 ticks (MAX_TICKS) after the one before. "jitter_ms_p50", "jitter_ms_p99": percentiles of the jitter
-        [ms].
+        "held_ticks": number of ticks in which a part did not follow the control law, summed over all parts. "long_gaps": number of steps
+        that came more than 3 ticks (MAX_TICKS) after the one before. "jitter_ms_p50", "jitter_ms_p99": percentiles of the jitter [ms].
         """
         return {
             "ticks": self.ticks,
@@ -54,7 +53,7 @@ class Counters:
 
 
 class MotionPublisher:
-    """Publishes the motion (`Motion`) of all parts."""
+    """Publishes a `Motion` message for each part: its action, measured positions, commanded velocity and acceleration, and attractor."""
 
     def __init__(self, bus: Bus, robot: Robot, law: RobotLaw, actions: Mapping[str, Action]) -> None:
         self._law, self._actions = law, actions
@@ -110,7 +109,7 @@ class CommandPublisher:
         drives.on_attempt_end(self._answer)
 
     def begin_tick(self) -> None:
-        """Forget the commands and the answer of the last tick; call this at the start of a tick or a run."""
+        """Forget the commands of the last tick, and its answer if that is not sent yet; call this at the start of a tick or a run."""
         self._sent = self._to_answer = None
 
     def send(self, k: int, orders: dict[str, Order], reference: Array, answer: Answer | None = None) -> None:
@@ -125,7 +124,7 @@ class CommandPublisher:
             self._commands.put(re_k=k, parts=orders, ref=reference.tolist(), ttl=self._ttl, answer=answer)
 
     def send_again(self, part: str) -> None:
-        """In free mode, let a client's request for a part take effect before the next tick.
+        """In free mode (ticks do not wait for answers), let a client's request for a part take effect before the next tick.
 
         The last control step is computed again with the request, and its commands are published. In lockstep (every tick waits for all
         participants) nothing is done.

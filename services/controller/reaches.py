@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reaches in progress: a marker is pulled to a target, then released (thesis 8.2)."""
+"""Reaches in progress: a force pulls a marker (named point on a link) to a target until the part settles or times out (thesis 8.2)."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`python -m services.cup`."""
+"""Starts the service that fetches the cup: `python -m services.cup`."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The running robot as a `Body` that follows paths."""
+"""The running robot as a `mobee.behaviours.pick.Body`, the interface by which the fetching of a cup moves a robot along paths."""
 
 from __future__ import annotations
 

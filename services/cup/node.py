@@ -44,7 +44,7 @@ class Paused(MobeeError):
 
 
 class CupNode:
-    """Fetches an upright thing and puts it down elsewhere, again and again, until this has succeeded as often as configured."""
+    """Fetches an upright object that vision finds (the thing), and puts it down elsewhere, until it has done so `config.times` times."""
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:
         self._service, self._config, self._robot = service, config, robot
@@ -62,7 +62,7 @@ class CupNode:
         self._map = pre_grasp_map(self._grasp, self._ground)
 
     def run(self) -> None:
-        """Fetch the thing until it was put down as often as configured. After an error, pause for a moment and try again."""
+        """Fetch the thing and put it down elsewhere, until this has succeeded `config.times` times; try again after an error."""
         self._service.ready()
         while self._done < self._config.times:
             try:

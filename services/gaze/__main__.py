@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`python -m services.gaze`."""
+"""Starts the gaze, the service that points the cameras at a target: `python -m services.gaze`."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Settings of the gaze."""
+"""Settings of the gaze, the service that points the cameras at a target."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Config(BehaviourConfig, frozen=True, kw_only=True):
         self.gaze(robot)
 
     def gaze(self, robot: Robot) -> Gaze:
-        """Return a new gaze with these settings, at rest; raises MobeeError if the part turns no camera."""
+        """Return a new `Gaze` (it computes the motion of the part) with these settings; raises MobeeError if the part turns no camera."""
         cameras = cameras_of(robot, self.cameras)
         require_cameras(robot, cameras, 1)
         return Gaze(robot, cameras, self.part, self.margin(robot), self.lag, Gains.named(self.gains).weight(robot.motors) > 0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs the gaze."""
+"""Runs the gaze: turns the cameras of the robot to a target."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from services.gaze.config import Config
 
 
 class GazeNode:
-    """Runs the gaze: turns the cameras so that the target is in the middle of the pictures."""
+    """Turns the cameras so that a target (an object that vision finds, or a marker of the robot) is in the middle of the pictures."""
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:
         self._gaze, self._errors = config.gaze(robot), Percentiles()

@@ -15,13 +15,13 @@ RECORDER = "recorder"
 class Entry:
     """The fixed properties of a service, which do not depend on its settings.
 
-    `module`: program, run with `python -m mobee_system.run`. `config`: class of its settings, as "module:class". `stage`: number
-    of its group; groups are listed in ascending order, and stopped in descending order. `after`: services that must be ready before it
-    joins the system. `nice`: niceness of its process. `vital`: whether the robot is stopped if the launcher gives the service up (does not
-    restart it any more). `participates`: in lockstep, whether every tick waits for its answer. `may_end`: whether it may end by itself
-    without a failure. `real_time`: its results depend on real time, so it does not run in lockstep. `needs`: Python packages that it
-    imports, each with the extra of this project that installs it. `given`: settings that follow from the name of the service, such as the
-    part of an agent.
+    `module`: program, run with `python -m mobee_system.run`. `config`: class of its settings, as "module:class". `stage`: number of its
+    group; a scenario lists its services by ascending stage, and the launcher stops them by descending stage. `after`: services that must be
+    ready before it joins the system. `nice`: niceness of its process. `vital`: whether the robot is stopped if the launcher gives the
+    service up (does not restart it any more). `participates`: in lockstep, whether every tick waits for its answer. `may_end`: whether it
+    may end by itself without a failure. `real_time`: its results depend on real time, so it does not run in lockstep. `needs`: Python
+    packages that it imports, each with the extra of this project that installs it. `given`: settings that follow from the name of the
+    service, such as the part of an agent.
     """
 
     module: str

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks before the start of a scenario: installed packages, free ports, robot and world files, and settings that must agree."""
+"""Checks before the start of a scenario (a set of services with their settings).
+
+They concern installed packages, free ports, robot and world files, and settings that must agree.
+"""
 
 from __future__ import annotations
 

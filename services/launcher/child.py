@@ -192,6 +192,7 @@ class Child:
     def note_silence(self, now: float) -> None:
         """Record that the service is silent, and start to measure how long it and the launcher wait for a processor.
 
+        A service is silent from the time at which a `stat` call has waited too long for its answer (0.2 s) until it answers one.
         `silence` subtracts this time, so that a service on a busy machine does not count as frozen. The measurement begins at the monotonic
         time `now` [s] and ends at the next answer.
         """

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One scenario on several hosts: which host starts which services, and the checks of a second launcher before it joins the first."""
+"""One scenario (a set of services with their settings) on several hosts.
+
+It determines which host starts which services, and checks a second launcher before that joins the first.
+"""
 
 from __future__ import annotations
 

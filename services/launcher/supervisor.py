@@ -33,9 +33,9 @@ END_TIMEOUT = 2.0  # s from SIGTERM to SIGKILL
 class Supervisor:
     """Starts and supervises the child processes of the launcher. All its work is done in the main thread, by handlers of `service`.
 
-    `children`: the services of this host, by name. `faults`: one line for each service that was given up. `stopped_robot`: whether
-    the robot was stopped, because a vital service (`Program.vital`) was given up. `bad_settings`: a service was given up because it cannot
-    use its settings.
+    `children`: the services of this host, by name. `faults`: one line for each service that was given up (is not restarted any more).
+    `stopped_robot`: whether the robot was stopped, because a vital service (`Program.vital`) was given up. `bad_settings`: whether a
+    service was given up because it cannot use its settings.
     """
 
     def __init__(
@@ -95,7 +95,7 @@ class Supervisor:
         return sim is not None and sim.stat is not None and (sim.stat.numbers.get("arrived") or 0) > 0
 
     def stop(self) -> None:
-        """End all services stage by stage, the last stage first. A service that does not end within 2 s is killed."""
+        """End all services, group by group in descending order of `Program.stage`. A service that does not end within 2 s is killed."""
         self._stopping = True
         for child in self.children.values():
             child.dismiss()
@@ -262,9 +262,9 @@ class Supervisor:
         self.report_fault(f"{child.who} {reason}", child.program.vital, f" (its log: {child.program.log})")
 
     def report_fault(self, fault: str, vital: bool, more: str = "") -> None:
-        """Publish an event and show on the screen that a service was given up; stop the robot if the service is vital.
+        """Publish an event and show on the screen that a service was given up, that is, that it is not restarted any more.
 
-        `fault`: service and reason. `more`: text that is added on the screen only.
+        `fault`: service and reason. `vital`: True: also stop the robot. `more`: text that is added on the screen only.
         """
         self.faults.append(fault)
         self._service.bus.event("error", "fault", fault)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Starts the model: `python -m services.model`."""
+"""Starts the service `model`, which computes contacts and constraint forces: `python -m services.model`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from services.model.node import ModelNode
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Run the model until a signal or a shutdown call."""
+    """Run the service `model`, which computes contacts and constraint forces, until a signal or a shutdown call."""
     run_node("services.model", Config, ModelNode, argv, prompt=True)
 
 

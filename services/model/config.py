@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Settings of the model."""
+"""Settings of the service `model`, which computes contacts and constraint forces."""
 
 from __future__ import annotations
 
@@ -11,7 +11,10 @@ from services.common.config import WorldConfig
 
 
 class Config(WorldConfig, frozen=True, kw_only=True):
-    """The settings of the model. World objects with the role target are not loaded, because vision perceives them."""
+    """The settings of the service `model`, which computes contacts and constraint forces.
+
+    Objects of the world's file with the role target are not loaded, because vision perceives them.
+    """
 
     gains: Literal["default", "derived", "published_2014"] = "published_2014"
     """Name of the set of gains for the constraint forces; the controller must use the same."""

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs the model: once per tick, computes the constraint forces from the newest state of every part."""
+"""Runs the service `model`: once per tick, computes the constraint forces from the newest state of every part.
+
+Constraint forces push the robot away from motor limits and contacts.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +35,7 @@ from services.model.world import WorldServer
 
 
 class ModelNode:
-    """Evaluates the model once per tick, and publishes constraint forces, targets, poses and contacts."""
+    """Evaluates the model of robot and world once per tick; publishes constraint forces, marker poses, contacts and targets of reaches."""
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:
         self._service, self._config, self._robot = service, config, robot

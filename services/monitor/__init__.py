@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The monitor: a page on the loopback interface that shows and controls the robot, and a recording.
+"""The monitor: serves a page on the loopback interface that shows and controls the robot, and records the 3D view and the page's values.
 
 Reads: clock, {part}/state, {part}/motion, {part}/reach, model/forces, controller/forces, model/contacts, world/*,
 vision/image/{camera}, agents/*/{decision,transition,learned}, event/*, estop, alive/*/*; asks model/rpc/world/list.

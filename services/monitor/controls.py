@@ -61,8 +61,8 @@ FARTHEST = 3.0  # m: a place farther from the origin is a mistake
 class Known:
     """The newest messages that the commands of the page depend on. The main thread writes them; other threads read them.
 
-    `gates`: state of robot_sim's safety gate, by part. `stopped`: monotonic time [s] at which all parts last reported an emergency stop.
-    `motions`, `reaches`: the newest message, by part. `objects`: objects of the model's world, by name.
+    `gates`: state of robot_sim's safety gate (check of commands), by part. `stopped`: monotonic time [s] at which all parts last reported
+    an emergency stop. `motions`, `reaches`: the newest message, by part. `objects`: objects of the world of the service `model`, by name.
     """
 
     gates: dict[str, str] = field(default_factory=dict)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs the monitor: up to 20 times per second, sends the newest message of every stream to the page and to the files."""
+"""Runs the monitor: shows the messages of other services on its web page, the robot up to 20 times per second, and records them."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ LEVELS = {"info": "INFO", "warning": "WARN", "error": "ERROR"}
 
 
 class MonitorNode:
-    """Shows the messages of other services on the page and writes them to the files.
+    """Shows the messages of other services on the monitor's web page, and writes them to the folder of the run if there is one.
 
     Of motions, reaches, forces, contacts and images it shows only the newest message, at fixed rates. It shows all events and transitions.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shows the record of a monitor again: the same page, with a time line."""
+"""Replays a run on the page of the monitor, with a time line, from the values of the page that the monitor recorded."""
 
 from __future__ import annotations
 

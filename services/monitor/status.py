@@ -38,10 +38,10 @@ class Seen:
 
 
 def banner(seen: Seen) -> dict[str, Any] | None:
-    """Return the warning that the page shows in large letters, as a dict of four texts: "level", "title", "text" and "todo".
+    """Return the warning that the web page shows in large letters, as a dict of four texts: "level", "title", "text" and "todo".
 
-    "level": kind of warning: ended, waiting, stop, fault, paused or hold (parts stand still and follow no commands). "text": explanation.
-    "todo": remedy. Returns None if there is nothing to warn of.
+    "level": kind of warning: ended, waiting, stop, fault, paused or hold (parts stand still and follow no commands). "title": the
+    warning in a few words. "text": explanation. "todo": remedy. Returns None if there is nothing to warn of.
     """
     names = sorted(seen.services)
     if seen.ended:

@@ -91,9 +91,10 @@ PER_TICK: tuple[type[Message], ...] = (
 def queues(everything: bool, locked: bool) -> dict[str, int]:
     """Return the key expressions of the streams to record, each with the number of messages that may wait in its queue.
 
-    `everything`: also the streams that are published only for subscribers (FOR_SUBSCRIBERS). `locked`: in lockstep the queues are longer.
-    Streams with few messages get short queues, because each place in a queue takes 0.25 kB of memory when its first message is stored
-    there. With long queues, such streams would fill new places, and the recorder's memory would grow, for hours.
+    `everything`: also the streams that are published only while they have a subscriber (FOR_SUBSCRIBERS). `locked`: whether the run is in
+    lockstep, in which the queues are longer. Streams with few messages get short queues. The reason: each place in a queue takes 0.25 kB of
+    memory from its first use on. A stream with few messages would need hours to use all places of a long queue, and the recorder's memory
+    would grow during this time.
     """
     most, others = (LOCKED_CAPACITY, OTHER_LOCKED_CAPACITY) if locked else (CAPACITY, OTHER_CAPACITY)
     recorded = (cls for cls in streams() if everything or cls not in FOR_SUBSCRIBERS)
@@ -104,7 +105,7 @@ def frequent_keys(parts: Iterable[str], everything: bool) -> list[str]:
     """Return the keys of the streams that have one key for each part, such as "{part}/motion", and may have a message in every tick.
 
     The key of the model's forces, "model/forces", is also among them. `parts`: parts of the robot. `everything`: also the streams that are
-    published only for subscribers (FOR_SUBSCRIBERS).
+    published only while they have a subscriber (FOR_SUBSCRIBERS).
     """
     recorded = (cls for cls in PER_TICK if cls.stream.variable and (everything or cls not in FOR_SUBSCRIBERS))
     return [cls.stream.key(name) for cls in recorded for name in (("model",) if cls is Forces else parts)]

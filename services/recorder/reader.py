@@ -24,7 +24,7 @@ _DAMAGE = (McapError, StructError, zstandard.ZstdError, ValueError, EOFError)  #
 class Recording:
     """A recording: one MCAP file, or all messages-*.mcap files in the folder of a run.
 
-    Iteration yields the messages in the order of arrival, without the copies for viewers.
+    Iteration yields the messages in the order of arrival, without the copies (JSON, ROS 2) that the recorder adds for viewers.
     """
 
     def __init__(self, place: Path) -> None:

@@ -4,5 +4,5 @@
 Writes: `tick`, `clock`, `{part}/state`, `sim/truth`, `estop` (while it is latched), `event/robot_sim`; in lockstep `turn/{participant}`.
 Reads: `commands`, `{part}/cmd`, `estop`, `alive/*/*`; in lockstep `done/{service}`; and the record of emergency stops on disk.
 Answers: `{part}/rpc/drive/{take,arm,release,hold}`, `{part}/meta`, `sim/rpc/{place,reset,pause,resume,pace}`,
-`estop/rpc/reset`, `robot_sim/rpc/{stat,mark,config,shutdown}`.
+`estop/rpc/reset`, `robot_sim/rpc/{stat,pulse,mark,config,shutdown}`.
 """

@@ -54,7 +54,7 @@ class SolidPairs(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def load_solid_pairs() -> SolidPairs:
-    """Return the list of pairs in this repository (solid_pairs.json)."""
+    """Return the list of pairs whose contacts count as solid contacts, read from this repository's file solid_pairs.json."""
     return msgspec.json.decode(SOLID_PAIRS.read_bytes(), type=SolidPairs)
 
 

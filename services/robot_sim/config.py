@@ -69,17 +69,17 @@ class Config(WorldConfig, frozen=True, kw_only=True):
     empty: none."""
 
     def packages(self) -> Mapping[str, str]:
-        """Return the packages of a back-end that is chosen by name; empty for "auto".
+        """Return the Python packages that the back-end needs; empty if `backend` is "auto".
 
         Keys: import names of the packages. Values: the extra of this project that installs the package.
         """
         return {} if self.backend == "auto" else dict.fromkeys(PACKAGES[self.backend], EXTRA)
 
     def check_robot(self, robot: Robot) -> None:
-        """Raise MobeeError if the back-end cannot move the robot with these motors, or if a part's name cannot be used on the bus.
+        """Raise MobeeError if the back-end cannot move the robot, a setting does not fit it, or a part's name cannot be used on the bus.
 
-        With `motors` = "identified", parameters must exist for this robot. Each pattern of `torques` must match a motor. Each name in
-        `encoder_errors` must be a motor, and each error must be finite.
+        If the setting `motors` is "identified", fitted motor parameters of this robot must exist. Each pattern of `torques` must match a
+        motor. Each name in `encoder_errors` must be a motor, and each error must be finite.
         """
         super().check_robot(robot)
         errors_of(robot, self.encoder_errors)

@@ -249,7 +249,7 @@ HOLD = Drive("hold")
 class InForce(Struct, frozen=True):
     """The command that a part follows at present.
 
-    `expires`: time at which its ttl is over, ns of the monotonic clock; not used in lockstep.
+    `expires`: time from which the part no longer follows it (end of its `ttl`), ns of the monotonic clock; not used in lockstep.
     """
 
     order: Order
@@ -261,8 +261,8 @@ class Gate:
 
     States: idle (no owner), hold (the part brakes and stands still), armed, fault, estop; the part moves only when armed. Each new owner
     gets a new epoch, a number that its calls and commands must contain. Commands are admitted between ticks; `tick` returns what the motors
-    do. The part follows a command until the next one is admitted. If the ttl of the command is over before that, the part brakes at full
-    deceleration, holds where it came to rest, and must be armed again.
+    do. The part follows a command until the next one is admitted. If the ttl (lifetime) of the command is over before that, the part brakes
+    at full deceleration, holds where it came to rest, and must be armed again.
     """
 
     def __init__(
@@ -355,7 +355,7 @@ class Gate:
             self._enter("hold", why)
 
     def lose_owner(self) -> None:
-        """End the ownership and put the part in hold, because the owner's liveliness token has disappeared.
+        """End the ownership, because the owner's liveliness token has disappeared; put the part in hold if it is armed.
 
         In hold the part brakes and stands still.
         """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The gates of all parts on the bus: commands, ownership, liveliness, emergency stop."""
+"""Connects the safety gates of all parts (the last check before the motors) with the bus: commands, ownership, liveliness, stops."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class Guard:
         return "" if self._stop is None else str(self._stop)
 
     def on_answer(self, handler: Callable[[str, int, Answer], None]) -> None:
-        """Set the function that gets the answers to ticks which arrive in `Commands` messages, in lockstep.
+        """Set the function that handles a service's answer to a tick, when this answer is a field of a `Commands` message (in lockstep).
 
         `handler`: called with the name of the service that answers, the number of the tick, and the answer.
         """
@@ -102,7 +102,7 @@ class Guard:
         self._waiting.clear()
 
     def hold_dependents(self, who: str) -> None:
-        """Put all parts of which the service `who` is the owner in hold, because `who` is late: they brake and stand still.
+        """Put all parts that the service `who` owns in hold, because `who` is late: they brake and stand still.
 
         If `who` is the model, the router or the launcher, all parts are put in hold.
         """

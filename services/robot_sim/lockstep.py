@@ -41,7 +41,7 @@ class Lockstep:
         return not self._barrier.absent()
 
     def startup_status(self) -> str:
-        """Return a text for `mobee status` with the participants for which tick 0 waits."""
+        """Return a text for `mobee status`: the participants (services that must answer every tick) that have not answered tick 0 yet."""
         absent = self._barrier.absent()
         return f"waits for {', '.join(absent)}" if absent else "all participants are ready"
 
@@ -79,7 +79,7 @@ class Lockstep:
     def numbers(self) -> Mapping[str, float]:
         """Return the numbers of the run, by name, for the call `stat`.
 
-        "tick": number of the present tick. "flaws": number of events that made the run unrepeatable. "arrived": whether the last tick is
+        "tick": number of the present tick. "flaws": number of events that made the run unrepeatable. "arrived": True if the last tick is
         reached.
         """
         return {"tick": self._service.bus.k, "flaws": self.flaws, "arrived": self.is_over()}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Makes the back-end named in the configuration."""
+"""Makes the back-end of the simulator (motor model alone, PyBullet or MuJoCo) that the configuration names."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from services.robot_sim.watch import Recorded
 
 
 def make_backend(config: Config, robot: Robot) -> Backend:
-    """Return the back-end that the configuration names.
+    """Return the back-end of the simulator (motor model alone, PyBullet or MuJoCo) that the configuration names.
 
     If the setting `record` names a folder, the back-end also writes the true joint positions and the contacts of every tick there. Raises
     BackendUnavailable if the back-end is not installed or cannot simulate the robot, and MobeeError if a setting of the motors, the world

@@ -99,14 +99,17 @@ class MujocoBackend:
         self.motors.restart(self.motors.seed, q)
 
     def contact(self) -> SolidContact:
-        """Return the deepest solid contact of the last tick; its depth is 0 if there was none."""
+        """Return the deepest solid contact of links and obstacles in the last tick; its depth is 0 if there was none."""
         if not self._deepest:
             return SolidContact()
         pair = max(self._deepest, key=self._deepest.__getitem__)
         return SolidContact(self._deepest[pair], pair)
 
     def contacts(self) -> Mapping[str, float]:
-        """Return a dict from each pair in solid contact ("NAME NAME", sorted) to the largest depth [m] in the last tick."""
+        """Return a dict from each pair in solid contact ("NAME NAME", sorted) to the largest depth [m] in the last tick.
+
+        The pairs are of links and obstacles. Contacts with other objects, such as targets, are left out.
+        """
         return self._deepest
 
     def gap(self) -> float:

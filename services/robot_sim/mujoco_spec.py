@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Writes a robot's tree and volumes into a MuJoCo specification: for the physics, and for the benchmarks that compare with MuJoCo."""
+"""Adds a robot's links, joints and volumes to a MuJoCo specification.
+
+The MuJoCo back-end of robot_sim uses it, and a benchmark that compares this library with MuJoCo.
+"""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ class Pause(Struct, frozen=True):
 
 
 class Node:
-    """robot_sim as a service: makes the ticks, and connects gates, physics and encoders with the bus."""
+    """robot_sim as a service: makes the ticks, and connects safety gates (checks of commands), physics and encoders with the bus."""
 
     def __init__(self, service: Service, config: Config, robot: Robot, backend: Backend) -> None:
         self._service, self._config, self._robot, self._backend = service, config, robot, backend

@@ -37,7 +37,7 @@ class Stamp:
 
 
 class ImperfectCameras:
-    """Follows the simulator's true posture and the encoders on the bus, and draws pictures of moments in the recent past."""
+    """Receives the true postures of the simulator and the encoder values from the bus, and draws the pictures of past exposures."""
 
     def __init__(
         self,
@@ -85,7 +85,7 @@ class ImperfectCameras:
     def arrived(self) -> int:
         """The time of the newest tick minus the true latency of the cameras, ns of the bus clock.
 
-        If the middle of an exposure is not later than this time, its pictures have left the cameras.
+        The pictures of all exposures whose middle is at or before this time have left the cameras.
         """
         return round(1e9 * (self._ticked - self.settings.latency - self.errors.latency))
 

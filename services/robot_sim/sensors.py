@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Encoders: sampling times of the parts, their states, and their metadata."""
+"""The simulated encoders: the times at which each part is sampled, the published states, and the limits of the parts' motors."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ class Sensors:
 
     @property
     def hash(self) -> str:
-        """SHA-256 of q, dq, mode and gate of every part, at every tick from 1 on: the same for two runs with the same states.
+        """SHA-256 of q, dq, mode and state of the safety gate of every part, at every tick from 1 on: equal for two runs with equal states.
 
         `digest` adds a tick. robot_sim calls it only in lockstep (every tick waits for all participants).
         """
@@ -149,9 +149,9 @@ class Sensors:
             self._report(part, self._bus.t, gate)
 
     def publish(self, mode: Literal["free", "lock", "paused"], dt: int, rate: float) -> None:
-        """Publish the message `Tick`, which starts the tick; publish nothing while parts have not been read since the reset.
+        """Publish the message `Tick`, which starts the tick. Before every part has been read since the reset, nothing is published.
 
-        `mode`: free, lock (lockstep) or paused. `dt`: the tick, ns. `rate`: simulated seconds per second of real time.
+        `mode`: free, lock (lockstep) or paused. `dt`: length of the tick, ns. `rate`: simulated seconds per second of real time.
         """
         if len(self._statuses) == len(self._where):
             self._tick.put(dt=dt, mode=mode, rate=rate, q=self._q.tolist(), parts=self._statuses)

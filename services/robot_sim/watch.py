@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Measures the physics tick by tick: counts contacts and holds, detects rest, publishes `sim/truth`, writes files."""
+"""Measures the physics tick by tick: counts contacts and stops of parts, publishes `sim/truth` (the true state), writes files."""
 
 from __future__ import annotations
 
@@ -93,6 +93,7 @@ class Counters:
     def count_gates(self, gates: Iterable[Gate]) -> None:
         """Count the tick, and record the age of the oldest command that a part follows; call this once per tick.
 
+        The age of a command is the number of ticks since the tick from whose state it was computed.
         The tick also counts in `hold_ticks` if at least one owned part is in hold (it brakes and stands still), and in `armed_ticks` if all
         owned parts follow commands. `gates`: the safety gates of all parts.
         """
@@ -119,7 +120,11 @@ class Counters:
             self.gap_min = gap
 
     def age_at(self, percent: float) -> float:
-        """Return the percentile `percent` (0 to 100) of the age of commands, in ticks; -1 before the first command."""
+        """Return the percentile `percent` (0 to 100) of the age of commands, in ticks; -1 before the first command.
+
+        The age of a command is the number of ticks since the tick from whose state it was computed. Each tick counts once, with the
+        oldest command that a part follows.
+        """
         total, seen = sum(self.ages.values()), 0
         for age in sorted(self.ages):
             seen += self.ages[age]
@@ -130,10 +135,11 @@ class Counters:
     def numbers(self, missed: int, pairs_watched: int) -> Mapping[str, float]:
         """Return the counts for `stat`, by name.
 
-        Names with "ticks" are numbers of ticks. "age_...": age of commands [ticks]. "solid_depth_max" and "gap_min": deepest contact and
-        smallest distance [m]. "stops": number of stops, "stop_time_max" and "stop_distance_max": their largest time [s] and distance [rad].
-        "overtime_ms_...": delay of a tick's start after its deadline. "tick_ms_...": computing time of a tick. `missed`: number of ticks
-        skipped since the start of the process. `pairs_watched`: number of pairs that the back-end tests for contact.
+        Names with "ticks" are numbers of ticks. "age_...": age of commands [ticks], as in `age_at`. "solid_depth_max" and "gap_min":
+        deepest contact and smallest distance [m]. "stops": number of stops, "stop_time_max" and "stop_distance_max": their largest time [s]
+        and distance [rad]. "overtime_ms_...": delay of a tick's start after its deadline [ms]. "tick_ms_...": computing time of a tick
+        [ms]. `missed`: number of ticks skipped since the start of the process. `pairs_watched`: number of pairs that the simulator tests
+        for contact.
         """
         return {
             "ticks": self.ticks,
@@ -163,9 +169,10 @@ CONTACTS = "contacts.csv"  # tick, pair, depth [m]; nothing for a tick without c
 
 
 class Recorded:
-    """A back-end that also writes the true joint positions and the solid contacts of every tick into files.
+    """A back-end (simulator of robot and world) that also records every tick in two files.
 
-    Both files begin anew with every run. Written data are in the files even if the process is killed.
+    It passes all calls on to another back-end, the recorded one. The files have the true joint positions (n,) rad and the solid contacts of
+    every tick. Both files begin anew with every run. Written data are in the files even if the process is killed.
     """
 
     def __init__(self, inner: Backend, folder: Path) -> None:
@@ -199,12 +206,15 @@ class Recorded:
             self._contacts.write(f"{self._k},{pair},{depth:.6g}\n")
 
     def reset(self, seed: int) -> None:
-        """Put the robot at home and the world in its initial state, and empty the files; `seed`: of the encoder noise."""
+        """Put the robot at home and the world in its initial state, and empty the files; `seed`: seed of the encoder noise."""
         self._inner.reset(seed)
         self._begin()
 
     def place(self, name: str, position: tuple[float, float, float]) -> None:
-        """Move a world object of the recorded back-end to a position (x, y, z) m, root frame; raises as its `place` does."""
+        """Move a world object of the recorded back-end to a position (x, y, z) m, root frame.
+
+        Raises MobeeError if there is no such object, if it is attached to a link, or if a number is not finite.
+        """
         self._inner.place(name, position)
 
     def contact(self) -> SolidContact:
@@ -237,7 +247,10 @@ NOT_FINITE = 1  # fault bit
 
 
 class Watch:
-    """Counts gate states, contacts and stops in every tick, and publishes the true state of the simulated robot (`sim/truth`)."""
+    """Counts contacts, stops and the states of the safety gates in every tick, and publishes the robot's true state (`sim/truth`).
+
+    The safety gate of a part checks each command before its motors.
+    """
 
     def __init__(self, bus: Bus, robot: Robot, backend: Backend, guard: Guard, truth_period: int) -> None:
         """`truth_period`: number of ticks between two messages of the truth."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`python -m services.vision`."""
+"""Starts the locator, which finds things in the pictures of two cameras: `python -m services.vision`."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Settings of the locator."""
+"""Settings of the locator, which finds things in the pictures of two cameras."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs the locator: reads pairs of pictures, publishes where known things are."""
+"""Runs the locator: finds the coloured targets of the world's file in pairs of pictures, and publishes their poses in the root frame."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ DIGITS = 3  # of published sizes, m: the model need not make a new shape in each
 
 
 class VisionNode:
-    """Locates things in the pictures of two cameras, when both pictures and both `Camera` messages of a tick have arrived.
+    """Locates objects in the pictures of two cameras, when both pictures and both `Camera` messages of a tick have arrived.
 
-    It reads no other messages, except the clock.
+    Apart from these messages it reads only the clock.
     """
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:

@@ -77,7 +77,7 @@ class Editor:
             world.add(name, box(0.05, 0.05, 0.05), position=self._witness_place())
 
     def edit(self) -> None:
-        """Make one random edit, or move both witnesses by a step."""
+        """Make one random edit, or move both witnesses (see `Editor`) by a step, one after the other."""
         kinds = (self._add, self._remove, self._move, self._role, self._attach, self._detach, self._step_witnesses, self._edit_shared)
         self._random.choices(kinds, weights=(4, 4, 8, 2, 1, 1, 4, 2))[0]()
         self.edits += 1

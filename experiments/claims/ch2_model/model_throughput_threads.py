@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Two threads of thesis figure 2.3: one moves every joint and one evaluates the model.  Also random boxes."""
+"""The two threads of thesis figure 2.3, of which one moves every joint and one evaluates the model; and random boxes for the world."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""NGIK: number of evaluations of natural gradient inverse kinematics, compared with other optimisers.
+"""NGIK (natural gradient inverse kinematics): number of evaluations of the model, compared with other optimisers.
 
 Claim: NES outperforms the other optimisation approaches at solving inverse kinematics for the iCub's 41 motors.  Source: thesis 3.1.1.
 Published: no numbers.  Run time: 3 minutes on 2 cores.
@@ -7,9 +7,10 @@ Published: no numbers.  Run time: 3 minutes on 2 cores.
 The targets are poses (position and rotation) of the right palm in random postures among 100 boxes; a solution is within 5 mm and 5 degrees
 and has no contact.  Either all 41 motors may move, or the 10 of torso and arm.  All solvers minimise the same cost.  A solver ends at its
 first good pose, restarts by its own criterion if it makes no progress, and stops without success after 20 000 evaluations.  The solvers are
-the library's NES, as in `solve_ik(method="nes")`; xNES as published (Glasmachers 2010); CMA-ES (package cma), which evaluates a whole
-generation in one batch; simulated annealing; and a particle filter.  The evaluations per target are counted, also for targets that are not
-reached; "outperforms" means fewer evaluations than the rival.  Each seed has its own targets.  Times are processor time of one core.
+the library's NES (natural evolution strategy), as in `solve_ik(method="nes")`; xNES as published (Glasmachers 2010); CMA-ES (package cma),
+which evaluates a whole generation in one batch; simulated annealing; and a particle filter.  The evaluations per target are counted, also
+for targets that are not reached; "outperforms" means fewer evaluations than the rival.  Each seed has its own targets.  Times are processor
+time of one core.
 """
 
 from __future__ import annotations
@@ -81,7 +82,8 @@ def _model() -> Model:
 class Solver:
     """Results of one solver with 41 or 10 moving motors: arrays (seeds,) of means over the targets of each seed.
 
-    `reached`: share of the targets.  `evaluations`: number per target.  `ms`: processor time per target.
+    `reached`: share of the targets for which a pose was found.  `evaluations`: number of evaluations of the model per target.  `ms`:
+    processor time per target.
     """
 
     reached: Array

@@ -2,17 +2,17 @@
 """Replanning: the time to a new path when a ball becomes solid in front of the moving hand.
 
 Claim: when the ball is made solid, "the planner/controller immediately finds the alternative path around it".  Source: thesis 4.3.2, fig.
-4.7.  Published: no number; aim of this reproduction: the new path under way within 200 ms of the bump, live, on robot_sim's clock.  Run
-time: 6 minutes on 2 cores, in real time.
+4.7.  Published: no number; aim of this reproduction: the new path under way within 200 ms of the bump, live, on the clock of robot_sim (the
+simulator).  Run time: 6 minutes on 2 cores, in real time.
 
 The roadmap has three poses of the right arm of `icub`: at the right of a ball, at its left, and above it.  The path from right to left
 through the ball is shorter than the path over it.  The real processes run with PyBullet (with --backend mujoco: MuJoCo), with ticks of 10
 ms that follow the clock (free mode), and the default control law at full speed.  A crossing is a motion from right to left, and begins with
 a new roadmap; 0.1 to 1.2 s after its start the ball becomes an obstacle in the model, and a body in the simulator.  The bump is the first
 tick at which the model reports a contact of the arm with the ball; overlap with a field, the larger volume around a link, counts too.  Then
-the motion ends, the edge is removed, and the arm is commanded at once to the next vertex of the new path.  The new path is under way from
-the first tick in which the motors execute a command that was computed after this request.  Also measured: when the joints stop approaching
-the old goal, which depends on the control law.
+the motion ends, its edge is removed from the roadmap, and a motion to the next vertex of the new path is requested at once.  The new path
+is under way from the first tick in which the motors execute a command that was computed after this request.  Also measured: when the joints
+stop approaching the old goal, which depends on the control law.
 """
 
 from __future__ import annotations

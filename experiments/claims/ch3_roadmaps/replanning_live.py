@@ -66,9 +66,9 @@ def ball() -> Array:
 
 
 class Job(Struct, frozen=True):
-    """The crossings of one launch (start of the live system).
+    """The crossings (motions of the arm from the right of a ball to its left) of one launch (start of the live system).
 
-    `after`: for each crossing, the time [s] from its start until the ball becomes solid.
+    `after`: for each crossing, the time [s] from its start until the ball, through which the arm could pass before, becomes solid.
     """
 
     after: list[float]
@@ -206,11 +206,11 @@ class Crosser:
 
 
 class ContactStopPlant(BusPlant):
-    """A BusPlant whose actions end when the model reports that the part begins to touch one of some objects.
+    """A BusPlant (the live robot as a plant) whose actions end when the model reports that the part begins to touch one of some objects.
 
     Such an action ends early, and `settled` of its outcome is False.  In lockstep (every tick waits for all participants) the plant
     receives no ticks while its part moves.  Therefore a second service of the same process, the watcher, takes part in every tick.  It
-    answers a tick when the plant has processed the forces of that tick, so that the plant reacts to them in the same tick.
+    answers a tick only after the plant has received the contact forces of that tick, so that the plant reacts to them in the same tick.
 
     Args:
         service, robot, part: see BusPlant.
@@ -245,7 +245,7 @@ class ContactStopPlant(BusPlant):
         return super().act(part, target)
 
     def leave(self) -> None:
-        """Release all goals.
+        """Release the part's goal (the right to move the part), as in `BusPlant.leave`.
 
         In lockstep (every tick waits for all participants), also report that later ticks need not wait for this service and for the
         watcher.

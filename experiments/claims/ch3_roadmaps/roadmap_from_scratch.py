@@ -229,8 +229,8 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 def explore_live(folder: Path, seed: int, most: int | None) -> None:
     """Explore the roadmap of a seed on the live robot, or continue an exploration that was stopped.
 
-    `folder`: here the observations are stored, and each launch gets a subfolder for its recording.  `most`: largest number of tries; None:
-    no limit.  Nothing is done if the exploration is finished.
+    `folder`: gets the file of observations, and a subfolder with the recording of each start of the live system.  `most`: largest number of
+    tries; None: no limit.  Nothing is done if the exploration is finished.
     """
     folder.mkdir(exist_ok=True)
     if (folder / DONE).exists():

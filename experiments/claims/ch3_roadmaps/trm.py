@@ -4,11 +4,11 @@
 Claim: the framework produces maps for all these tasks: poses that meet the task's constraints, spread over its task space, in one graph.
 Source: thesis 3.3, 3.4 and 4.3.  Published: figures only, about 5000 poses for figure 4.8.  Run time: about 5 minutes a seed on 2 cores.
 
-The tasks are in trm_tasks.py; the box of a task is the range of its coordinates, and the spacing is the distance between neighbouring
-vertices of a roadmap in the task space.  The part of the box that the robot can reach is found independently of the roadmap: by least
-squares on a lattice of half the spacing with many starts per point, and by random starts at random points.  A reachable point counts as
-covered if a vertex of the map is within a spacing of it.  python-fcl checks the contacts of every pose.  `python -m
-experiments.claims.ch3_roadmaps.trm_pictures NAME` builds one map and draws it.
+"By evolution": with natural evolution strategies, as in the thesis.  The tasks are in trm_tasks.py; the box of a task is the range of its
+coordinates, and the spacing is the distance between neighbouring vertices of a roadmap in the task space.  The part of the box that the
+robot can reach is found independently of the roadmap: by least squares on a lattice of half the spacing with many starts per point, and by
+random starts at random points.  A reachable point counts as covered if a vertex of the map is within a spacing of it.  python-fcl checks
+the contacts of every pose.  `python -m experiments.claims.ch3_roadmaps.trm_pictures NAME` builds one map and draws it.
 """
 
 from __future__ import annotations

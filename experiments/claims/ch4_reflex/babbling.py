@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Babbling: collisions and completed commands under random position moves of 23 motors at 20 % speed, at a table (thesis 4.1.1).
 
-Claim: without MoBeE the robot hits itself and the table hundreds of times in two hours; with MoBeE it never does, and the second MoBeE
-completes more of the commands, and more smoothly, than the first.  Source: thesis 4.1.1; published: "approximately two hours over several
-trials of 5 to 20 minutes each with joint velocity limited to 20% of maximum ... MoBeE effectively prevented all of them", on the robot.
-Here: the PyBullet robot (with --backend mujoco: MuJoCo's), with all processes in lockstep (every tick waits for all of them).  The postures
-are uniform over the whole ranges of torso (3 motors), head with eyes (6) and arms without hands (7 each), and their sequence is the same in
-all modes: without MoBeE, with MoBeE 1.0 and with MoBeE 2.0.  A command is a posture of one part.  It is completed if all motors of the part
-end within 10 degrees of it, returned if the part ends within 5 degrees of where it began, and else deflected.
+Claim: without MoBeE the robot hits itself and the table hundreds of times in two hours; with MoBeE it never does, and MoBeE 2.0 completes
+more of the commands, and more smoothly, than MoBeE 1.0.  Source: thesis 4.1.1; published: "approximately two hours over several trials of 5
+to 20 minutes each with joint velocity limited to 20% of maximum ... MoBeE effectively prevented all of them", on the robot.  Here the robot
+is simulated by PyBullet (with --backend mujoco: by MuJoCo), with all processes in lockstep (every tick waits for all of them).  The
+postures are uniform over the whole ranges of torso (3 motors), head with eyes (6) and arms without hands (7 each), and their sequence is
+the same in all modes: without MoBeE, with MoBeE 1.0 (a reflex, which moves the robot back along its recent poses) and with MoBeE 2.0 (a
+controller with repulsive forces).  A command is a posture of one part.  It is completed if all motors of the part end within 10 degrees of
+it, returned if the part ends within 5 degrees of where it began, and else deflected.
 
 Run time: about an hour for 2 h of robot time in each of the three modes; --resume continues an interrupted run.
 """

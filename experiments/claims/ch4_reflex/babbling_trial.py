@@ -150,9 +150,10 @@ Outcome = Literal["completed", "deflected", "returned"]
 
 
 def scenario(mode: str, folder: Path, seed: int, backend: str = PHYSICS[0]) -> str:
-    """Return the text of a scenario for one trial; the system writes its recordings into `folder`.
+    """Return the text of a scenario (the file that lists the system's processes and settings) for one trial.
 
-    `mode`: "off" (without MoBeE), "one" (MoBeE 1.0) or "two" (MoBeE 2.0).  `backend`: physics engine of the robot.  `seed`: of the run.
+    `folder`: the system writes its recordings into it.  `mode`: "off" (without MoBeE), "one" (MoBeE 1.0) or "two" (MoBeE 2.0).  `backend`:
+    physics engine of the robot.  `seed`: of the run.
     """
     where = _quoted(folder)
     gains = 'gains = "default"' if mode == "two" else ""
@@ -174,7 +175,7 @@ class TrialFailed(MobeeError):
 def run_trial(
     folder: Path, mode: str, robot: Robot, seed: int, ticks: int, show: Callable[[float], None], backend: str = PHYSICS[0]
 ) -> None:
-    """Run a trial of `ticks` ticks, and write commands, positions, contacts and the launcher's summary into `folder`.
+    """Run a trial of `ticks` ticks, and write commands, positions, contacts and the summary of the run into `folder`.
 
     `mode`: "off" (without MoBeE), "one" (MoBeE 1.0) or "two" (MoBeE 2.0).  `seed`: of the random postures and the simulated robot.  `show`:
     function that is called with the finished share in [0, 1].  `backend`: physics engine.  Raises TrialFailed if the ticks stop or the
@@ -229,7 +230,8 @@ class Lockstep(Struct, frozen=True):
     """The part of the launcher's summary about lockstep, in which every tick waits for the answers of all processes.
 
     `ticks`: number of ticks.  `speed`: in multiples of real time.  `repeatable`: whether all processes answered every tick in time.
-    `states_sha256`: SHA-256 hash of the states of all parts (q, dq, mode and gate) in all ticks.
+    `states_sha256`: SHA-256 hash of the states of all parts in all ticks: q, dq, mode, and state of the gate (the check of commands before
+    the motors).
     """
 
     ticks: int

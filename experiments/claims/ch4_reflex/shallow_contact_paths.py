@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Straight paths of the hand into the table's field at any angle, and a client that sends position references along such a path."""
+"""Straight paths of the hand into the table's field at any angle, and a client that sends position references along such a path.
+
+The table's field is the zone around the table in which the hand's fields (larger volumes around its links, which are not solid but cause
+repulsive forces) overlap the table.
+"""
 
 from __future__ import annotations
 
@@ -36,9 +40,9 @@ HIGHEST_START = 0.15  # m, of the palm
 class Spot:
     """A place at which the left hand just touches the table's field, and the horizontal direction of the paths through this place.
 
-    The table's field is the zone around the table in which the hand's fields, larger volumes that are not solid, overlap the table.  `q`:
-    posture there, (n,) rad.  `position` (3,) m and `rotation` (3, 3): pose of the palm, root frame.  `heading`: horizontal unit vector
-    (3,), root frame.
+    The table's field is the zone around the table in which the hand's fields (larger volumes around its links, which are not solid but
+    cause repulsive forces) overlap the table.  `q`: posture there, (n,) rad.  `position` (3,) m and `rotation` (3, 3): pose of the palm,
+    root frame.  `heading`: horizontal unit vector (3,), root frame.
     """
 
     q: Array
@@ -51,8 +55,9 @@ class Spot:
 class HandPath:
     """A path of the hand that begins above the table, and then approaches straight, at a constant angle, into the table's field.
 
-    The table's field is the zone around the table in which the hand's fields, larger volumes that are not solid, overlap the table.
-    `postures`: (w, n) rad, in the order of the path.  `start`: index of the posture at which the straight approach begins.
+    The table's field is the zone around the table in which the hand's fields (larger volumes around its links, which are not solid but
+    cause repulsive forces) overlap the table.  `postures`: (w, n) rad, in the order of the path.  `start`: index of the posture at which
+    the straight approach begins.
     """
 
     postures: Array
@@ -62,8 +67,9 @@ class HandPath:
 class Table:
     """The iCub at its table, and straight paths of its left hand into the table's field.
 
-    The table's field is the zone around the table in which the hand's fields, larger volumes that are not solid, overlap the table.
-    `robot`, `model`: the iCub and its model at the table.  `watch`: checks poses for contacts and for motors beyond limits and constraints.
+    The table's field is the zone around the table in which the hand's fields (larger volumes around its links, which are not solid but
+    cause repulsive forces) overlap the table.  `robot`, `model`: the iCub and its model at the table.  `watch`: checks poses for contacts
+    and for motors beyond limits and constraints.
     """
 
     def __init__(self) -> None:
@@ -85,8 +91,9 @@ class Table:
     def spots(self, number: int, seed: int) -> list[Spot]:
         """Return `number` random places at which the hand just touches the table's field, as `Spot`.
 
-        The table's field is the zone around the table in which the fields of the hand, larger volumes that are not solid, overlap the
-        table.  The arm can follow the paths through each place at 90, 45 and 0 degrees to the table's top.  `seed`: of the random choice.
+        The table's field is the zone around the table in which the hand's fields (larger volumes around its links, which are not solid but
+        cause repulsive forces) overlap the table.  The arm can follow the paths through each place at 90, 45 and 0 degrees to the table's
+        top.  `seed`: of the random choice.
         """
         rng = np.random.default_rng([seed, 0x67])
         found: list[Spot] = []
@@ -180,7 +187,10 @@ def _is_on_table(violations: Sequence[Violation], touching: tuple[str, ...]) -> 
 
 
 class Client:
-    """A client that sends position references along a path, one per tick, and tries again (`retry`) when the reflex gives control back.
+    """A client that sends position references along a path, one per tick.
+
+    The reflex takes control from the client after a contact, and moves the robot back along its recent poses.  When it returns control to
+    the client, `retry` selects the reference at which the client continues.
 
     `begin`: index of the reference at which the straight approach begins.  `runs`: how often the client has begun the straight approach.
     """

@@ -151,7 +151,7 @@ class Truth:
             self._follow(reflex.recovery, depth)
 
     def finish(self) -> None:
-        """Evaluate the first recovery at the end of the trial, if the recovery is not complete by then."""
+        """Evaluate the first recovery (motion back along earlier poses) at the end of the trial, if it is not complete by then."""
         if not self._is_over and self._first is not None:
             self._conclude(self._first, self._depths[-1])
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Two robots in one workspace: iCub and Katana babble beside each other, each protected on its own, under one model (thesis 4.1.2).
+"""Two robots in one workspace: iCub and Katana babble beside each other, each with its own protection, in one common model (thesis 4.1.2).
 
 Claim: robots that share a model and have a controller each do not collide.  Source: thesis 4.1.2: two reflexes, synchronised "by adjusting
 the control frequency. That is, the speed with which the reflex controller indexes through the history buffer"; then "the reflexive
@@ -46,7 +46,7 @@ Groups = Mapping[str, Sequence[Mapping[str, Any]]]
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the option --minutes, the robot time of a trial, to the parser."""
+    """Add the option --minutes, the robot time of a trial with controllers, to the parser."""
     parser.add_argument(
         "--minutes",
         type=positive_number,
@@ -80,8 +80,8 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Let both robots babble under a protection, and return the times, contacts and counts of reflexes.
 
-    The keys are those of `shared_workspace_trial.run_trial`.  `settings`: "protection", "minutes" and "paces", the arguments of that
-    function.  `seed`: of postures and encoder noise.
+    The keys are those of `shared_workspace_trial.run_trial`.  `settings`: the arguments of that function: "protection"; "minutes" of robot
+    time; "paces", numbers of recorded poses per tick that the reflexes of iCub and Katana retrace.  `seed`: of postures and encoder noise.
     """
     return run_trial(settings["protection"], settings["minutes"], settings["paces"], seed)
 

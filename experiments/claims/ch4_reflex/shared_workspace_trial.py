@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Two robots that babble in one workspace: each has its own client and its own protection, and both share one model (thesis 4.1.2)."""
+"""Two robots that babble (move to random postures) in one workspace, and protections against their collisions (thesis 4.1.2).
+
+A client is a program that sends random postures to a robot.  Its protection is none, the reflex of MoBeE 1.0 (which moves the robot back
+along its recent poses after a contact), or a controller of MoBeE 2.0.  Both robots share one model.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +34,7 @@ MARK = "katana_"  # begins the names of the Katana's shapes, motors and parts
 
 
 class Protected(Protocol):
-    """A client of one robot together with the protection of that robot.
+    """A client of a robot together with its protection against collisions: none, the reflex or a controller.
 
     `mode`: the kind of its commands, "position" or "velocity".
     """
@@ -135,7 +139,9 @@ class WithReflex:
 
 
 class WithController:
-    """A client and a controller of MoBeE 2.0, which moves only the robot's own motors; the random postures are its attractors.
+    """A client and a controller of MoBeE 2.0, which moves only the robot's own motors.
+
+    The client's random postures are the controller's attractors (poses to which it pulls the motors).
 
     `own`: slice of these motors among those of both robots.  `seed`: of the random postures.  `model`: of both robots.  `gains`: of the
     controller.
@@ -155,7 +161,8 @@ class WithController:
     def command(self, k: int, q: Array, pose: Pose) -> Array:
         """Return the velocities (n_own,) rad/s that the controller commands in tick `k`; see `Protected.command`.
 
-        When the motion has settled or timed out, the client's next random posture becomes the attractor.
+        When the motion has settled or timed out, the client's next random posture becomes the attractor (the pose to which the controller
+        pulls).
         """
         controller, own = self._controller, self._own
         velocity = controller.step(q, DT, pose=pose).velocity[own]
@@ -240,9 +247,9 @@ def _is_of(robot: str, violation: Violation) -> bool:
 def babble(makers: Sequence[tuple[slice, Protected]], model: Model, minutes: float, seed: int) -> Truth:
     """Simulate both robots for `minutes` of robot time, and return the record of their contacts.
 
-    `makers`: a pair for each protected client: the slice of the motors that it commands, among those of both robots, and the client.
-    `seed`: of the motors' encoder noise.  A command that is computed from the encoders of tick k moves the motors from tick k + 1 on, as in
-    the live system.
+    `makers`: a pair for each client: the slice of the motors that it commands, among those of both robots, and the client with its
+    protection.  `seed`: of the motors' encoder noise.  A command that is computed from the encoders of tick k moves the motors from the
+    next tick on, as in the live system.
     """
     robot, parameters, truth = two_robots(), MotorParameters(), Truth()
     motors = Motors(robot, parameters, seed, robot.home)
@@ -260,10 +267,11 @@ def babble(makers: Sequence[tuple[slice, Protected]], model: Model, minutes: flo
 
 
 def run_trial(protection: str, minutes: float, paces: Sequence[float], seed: int) -> dict[str, float]:
-    """Let both robots babble under a protection, and return the measurements.
+    """Let both robots babble (move to random postures) with a protection against collisions, and return the measurements.
 
-    `protection`: "none", "reflexes", "one reflex" or "controllers".  `minutes`: robot time.  `paces`: number of recorded poses per tick
-    that the reflexes of iCub and Katana retrace.  `seed`: of postures and encoder noise.
+    `protection`: "none"; "reflexes", one for each robot; "one reflex" for both robots together; or "controllers", one for each robot.
+    `minutes`: robot time.  `paces`: for the iCub and for the Katana, the number of recorded poses that the reflex retraces in each tick;
+    "one reflex" has the number of the iCub.  `seed`: of postures and encoder noise.
 
     Keys: "minutes"; "collisions", "deepest", "deepest_own", "path" and "near" as in `Truth`; "reflexes", number of reflexes; "stuck",
     number of reflexes that found no pose without violation.

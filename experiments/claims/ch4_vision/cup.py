@@ -13,11 +13,11 @@ the finger motors are 0.09 and 0.3 N m.  As in a reach, contacts of the fields (
 forces) with the cup and with the seen clutter exert no force on the hand.  A jump of the torques of shoulder and waist is a bump: the arm
 moves back, and on the next path the palm moves around or over the place of the bump.
 
-Planners of the path to the pre-grasp: the map of pre-grasps (A* over free edges); the learned reacher, which has learned from 300 tries (a
-plan and then a reach to a target) on the offline plant without clutter, and moves only the arm; inverse kinematics with RRT-Connect of
-OMPL.  Grasp, lift and placing are the same for all.
+There are three planners of the path to the pre-grasp.  "map": A* over the free edges of a map of pre-grasps.  "learner": an agent that has
+learned to reach from 300 tries (a plan and then a reach to a target) on the offline plant without clutter, and moves only the arm.  "rrt":
+inverse kinematics with RRT-Connect of OMPL.  Grasp, lift and placing are the same for all.
 
-The settings of grip, bumps and motions were chosen with the results of seeds below 520 in view; the results are those of seeds from 520.
+The settings of grip, bumps and motions were chosen by the results of seeds below 520; the reported results are those of seeds from 520 on.
 Run time: 5 s of processor time for a trial.  Needs the extras `sim` and `planning`.
 """
 

@@ -1,16 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Calibration of imperfect cameras by looking at the robot's own hand (thesis 4.1.2): errors of a ball's position before and after.
 
-Claim: a robot calibrates its cameras by looking at its own hand, and knows how well.  Source: thesis 4.1.2 lets two robots look at each
-other's world, without numbers for calibrated stereo.  Aims of this reproduction: after `mobee calibrate` the position of a ball is wrong by
-at most 5 mm (median) and 15 mm (95 %), over 500 random gazes and places (100 for each of 5 robots), with cameras displaced by up to 2 cm
-and 2 deg and head encoders that are wrong by up to 1 deg; and the reported covariance is honest: the squared error, normalised by this
-covariance, is below the 95 % quantile of its distribution for 90 to 98 % of the places.
+Claim: a robot calibrates its cameras with pictures of its own hand, and correctly computes the covariance of the remaining error.
+Source: in thesis 4.1.2 one robot learns from another one where things are, without numbers for calibrated stereo.  Aims of this
+reproduction: after `mobee calibrate` the position of a ball is wrong by at most 5 mm (median) and 15 mm (95 %), over 500 random gazes and
+places (100 for each of 5 robots), with cameras displaced by up to 2 cm and 2 deg and head encoders that are wrong by up to 1 deg; and the
+reported covariance is correct: the squared error, normalised by this covariance, is below the 95 % quantile of its distribution for 90 to
+98 % of the places.
 
-A trial draws the errors of one robot, calibrates it by 40 postures of its hand, and then shows it balls.  All pictures are rendered with
-distortion, noise and motion blur, in a cluttered room.  "Before" the calibration, a position is the point nearest to the two rays of the
-ball, by the cameras of the model; "after" it, the position is computed from the outlines in the same pictures (`mobee.vision.objects`).
-Only pictures from which both positions can be computed count.  Run time: one minute a robot on one core.
+A trial draws the errors of one robot and calibrates it by 40 postures of its hand.  Then a ball is put at random places in view of both
+cameras.  All pictures are rendered with distortion, noise and motion blur, in a cluttered room.  "Before" the calibration, a position is
+the point nearest to the two rays of the ball, by the cameras of the model; "after" it, the position is computed from the outlines in the
+same pictures (`mobee.vision.objects`).  Only pictures from which both positions can be computed count.  Run time: one minute a robot on one
+core.
 """
 
 from __future__ import annotations
@@ -85,7 +87,7 @@ def rig() -> Rig:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Draw the camera errors of one robot, calibrate its cameras with a tag on its own palm, and show it balls at N places.
+    """Draw the camera errors of one robot, calibrate its cameras with a tag on its own palm, and measure a ball's position at N places.
 
     Main keys: "before" and "after", errors of the ball's position without and with the calibration (N,) m; "normalised", squared errors
     after calibration, normalised by the covariance that the robot computes (N,); "hand_before" and "hand_after", median errors of the hand
@@ -226,7 +228,7 @@ def findings(found: Cells) -> dict[str, Any]:
     """Return the results of the sweep.
 
     Keys: "runs", a dict from each finished cell (one simulated robot) to its numbers, such as "before, median mm" and "after, median mm",
-    the errors of places before and after the calibration; "claims", a list with the judged claims, as dicts (`Claim.record`).
+    the errors of the ball's position before and after the calibration; "claims", a list with the judged claims, as dicts (`Claim.record`).
     """
     groups = grouped(found, "calibration", ("hand",))
     band = chi_squared(0.95, 3)

@@ -1,17 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Ball, cup and box seen by imperfect, calibrated cameras: errors of their positions, their covariances, and false objects.
 
-Claim: a robot that has calibrated its cameras by looking at its own hand places ball, cup and box within millimetres, knows how well, and
-reports no object where there is none.  Source: thesis 4.3.3 puts into the world what the eyes see, without numbers.  Aims of this
-reproduction: over random gazes and places the error is at most 5 mm (median) and 15 mm (95 %); the squared error, normalised by the
-reported covariance, is below the 95 % quantile of its distribution for 90 to 98 % of the places; and no false object is reported in 10
-minutes, at 15 pictures a second, in front of a table without the things, on which some sheets of paper have the colours of the things.
+Claim: a robot that has calibrated its cameras by looking at its own hand places ball, cup and box within millimetres, reports correct
+covariances of their positions, and reports no object where there is none.
+Source: thesis 4.3.3, in which seen objects are put into the world model; it has no numbers.  Aims of this reproduction: over random gazes
+and places the error is at most 5 mm (median) and 15 mm (95 %); the squared error, normalised by the reported covariance, is below the 95 %
+quantile of its distribution for 90 to 98 % of the places; and no false object is reported in 10 minutes, at 15 pictures a second, in front
+of a table without these three things, on which some sheets of paper have their colours.
 
-A trial draws the errors of one robot and calibrates it by 40 postures of its hand.  Then it shows ball, cup and box side by side in random
-places, each thing upright and with a random angle, and takes one picture with each camera; things that are hidden by another thing or an
-arm may be missed.  All pictures are rendered with distortion, noise and motion blur, in a cluttered room.  For the last claim the things
-are taken away, and the head looks around: 15 pairs of pictures with each of many random gazes, from which the tracker reports objects as in
-the live system.  Run time: five minutes a robot on one core.
+A trial draws the errors of one robot's cameras and calibrates them with 40 postures of its hand.  Then it shows ball, cup and box side by
+side in random places, each thing upright and with a random angle, and takes one picture with each camera; things that are hidden by another
+thing or an arm may be missed.  All pictures are rendered with distortion, noise and motion blur, in a cluttered room.  For the last claim
+the things are taken away, and the head looks around: 15 pairs of pictures with each of many random gazes, from which the tracker reports
+objects as in the live system.  Run time: five minutes a robot on one core.
 """
 
 from __future__ import annotations

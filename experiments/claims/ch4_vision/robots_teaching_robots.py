@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Robots teaching robots: a Katana carries a ball to places that it knows, and the iCub learns to place what it sees (thesis 4.1.2).
+"""Robots teaching robots: a Katana carries a ball to known positions, and the iCub learns to compute them from pictures (thesis 4.1.2).
 
 Claim: a robot with uncalibrated cameras learns from another robot where things are.  Source: thesis 4.1.2 and Leitner et al. 2012 (doi
 10.5772/54657: neural network and genetic programming, from the pixels in both cameras and the encoders, "in the centimetre range"; no
@@ -8,11 +8,12 @@ better than stereo by the uncalibrated cameras.
 
 A trial draws the errors of one iCub's cameras and head encoders, as in hand-eye-calibration.  The Katana carries a red ball (the thesis: a
 children's block) to random places 20 to 65 cm from the eyes; for each, the iCub looks from random postures of torso, head and eyes.  Both
-move on the offline plant under one model, kept apart by the controller; pictures are rendered with distortion and noise, in a room without
-clutter on the table.  The Katana reports the place by its own encoders.  A fifth of the Katana's poses is held out: no localiser (method
-that computes the ball's position from both pictures and the encoders) learns from a picture of them.  The localisers are compared with
-uncalibrated stereo, which uses the cameras of the model, and with stereo after a calibration of the cameras by 20 postures of the hand.
-Errors are distances from the ball's true place; the error of a robot is its median.  Run time: about three minutes a robot on one core.
+move on the offline plant (simulation in one process) under one model, kept apart by the controller; pictures are rendered with distortion
+and noise, in a room without clutter on the table.  The Katana reports the place by its own encoders.  A fifth of the Katana's poses is held
+out: no localiser (method that computes the ball's position from both pictures and the encoders) learns from a picture of them.  The
+localisers are compared with uncalibrated stereo, which uses the cameras of the model, and with stereo after a calibration of the cameras by
+20 postures of the hand.  Errors are distances from the ball's true place; the error of a robot is its median.  Run time: about three
+minutes a robot on one core.
 """
 
 from __future__ import annotations
@@ -74,13 +75,14 @@ def rig() -> Rig:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Let the Katana teach one iCub where things are, and measure stereo and all localisers on poses of the Katana that were held out.
+    """Let the Katana teach one iCub where the ball is, and measure stereo and all localisers on poses of the Katana that were held out.
 
-    Main keys: "errors, NAME", distances (N,) m of the computed from the true positions, for stereo and each localiser; "curves", dict from
-    a localiser to its median errors [m], one for each number of lessons (labelled samples) in "counts"; "held_out", number of lessons for
-    the test; "reported", median error [m] of the positions that the Katana reports; "robot_seconds", robot time of the teaching [s].
-    `settings`: "poses", number of postures of the Katana; "looks", number of looks of the iCub at each; "postures", number of postures of
-    the hand for the calibration of stereo.  `seed`: of everything random.
+    A localiser is a method that computes the position of the ball from both pictures and the encoders.  Main keys: "errors, NAME",
+    distances (N,) m of the computed from the true positions, for stereo and each localiser; "curves", dict from a localiser to its median
+    errors [m], one for each number of lessons (labelled samples) in "counts"; "held_out", number of lessons for the test; "reported",
+    median error [m] of the positions that the Katana reports; "robot_seconds", robot time of the teaching [s].  `settings`: "poses", number
+    of postures of the Katana; "looks", number of looks of the iCub at each; "postures", number of postures of the hand for the calibration
+    of stereo.  `seed`: of everything random.
     """
     lessons, time = taught(settings["poses"], settings["looks"], seed)
     learned, held_out = split_by_pose(lessons.poses, HELD_OUT, seed)
@@ -213,9 +215,9 @@ CLAIMS = (corrected, model_free, network, programs)
 def findings(found: Cells) -> dict[str, Any]:
     """Return the results of the sweep.
 
-    Keys: "localisers", a dict from a localiser, or from stereo without or with calibration, to the median and 95 % quantile of its errors
-    [cm], as text; "robots", a dict from each finished cell (one simulated robot) to the numbers of its lessons, poses and time; "claims", a
-    list with the judged claims, as dicts (`Claim.record`).
+    Keys: "localisers", a dict from a localiser (method that computes the position of the ball from pictures and encoders), or from stereo
+    without or with calibration, to the median and 95 % quantile of its errors [cm], as text; "robots", a dict from each finished cell (one
+    simulated robot) to the numbers of its lessons, poses and time; "claims", a list with the judged claims, as dicts (`Claim.record`).
     """
     groups = grouped(found, "teacher", ("katana",))
     runs = groups.get("katana", [])

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Constraint violations: a search for the arm command that violates most the constraints of shoulder cables and forearm.
 
-Claim: with the default gains no attractors, inside or far outside the motors' ranges, held or in any sequence, carry an arm more than 2
-degrees beyond a constraint on several joints (at least one of its inequalities a.q + b > 0 must hold), measured along the normal, -(a.q +
-b)/|a|.  The fastest impact of a motor at a hard stop is reported too.  Source: this project's goal; the constraints are those of thesis
-5.2.5.  Published: no number; the thesis says of positional constraints that their forces may grow without bound, "but this never happens in
-practice".  Run time: 10 000 tries for both gain sets and 2000 with forces of a client, a few minutes.
+Claim: with the default gains no attractors (poses to which the control law pulls the arm), inside or far outside the motors' ranges, held
+or in any sequence, carry an arm more than 2 degrees beyond a constraint on several joints (at least one of its inequalities a.q + b > 0
+must hold), measured along the normal, -(a.q + b)/|a|.  The fastest impact of a motor at a hard stop is reported too.  Source: this
+project's goal; the constraints are those of thesis 5.2.5.  Published: no number; the thesis says of positional constraints that their
+forces may grow without bound, "but this never happens in practice".  Run time: 10 000 tries for both gain sets and 2000 with forces of a
+client, a few minutes.
 
 A try is one command of one arm: a start, three attractors, and the duration of each attractor.  A forced try has in addition, for each
 attractor, a force in configuration space and one at the palm.  Both arms try at once while the torso moves to a random posture, with a

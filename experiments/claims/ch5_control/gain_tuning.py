@@ -2,9 +2,10 @@
 """Gain tuning: the search that tuned `Gains.default()`, a (1+1) evolution strategy over the logarithms of the gains.
 
 Claim: no gains that a seeded search finds are clearly better than `Gains.default()` by the criteria of `Judged`: settling time and
-overshoot; depths of solid contacts while the hands are commanded 5 to 25 cm below the table's top, while a client pushes, and while the
-robot moves between random postures; chatter of the hands at the table with commands that are one, three and four ticks old, at 100 Hz; and
-violated constraints.
+overshoot; depths of solid contacts while the hands are commanded 5 to 25 cm below the table's top, while a client (another program) pushes,
+and while the robot moves between random postures; depths of field contacts at the table; chatter of the hands at the table with commands
+that take effect one, three and four ticks after they were computed, at 100 Hz; violated constraints; impacts at hard stops; and the longest
+stable control period.
 Source: this project's goals for MoBeE 2.0 (thesis 5.2).  Published number: none, the thesis has no criteria.  Run time: half an hour for
 100 gain sets.
 
@@ -65,11 +66,12 @@ class Judged(Row):
 
     `settling_s`: median settling time of steps [s].  `overshoot`: largest overshoot of a step of a single motor, as a share of the step.
     `solid_mm`: depth of the deepest solid contact while the robot moves between random postures, and while the hands press into the table
-    with commands that act 1 or 3 ticks after they were computed; `field_mm`: depth of the deepest field contact while they press;
-    `pushed_mm`: depth of the deepest solid contact while a client pushes.  `chatter_mm`: oscillation of the palms at the table with
-    commands 1 tick old, mean over the postures; `late_mm`: the same with commands 3 ticks old; `later_mm`: the same with commands 4 ticks
-    old.  `clause_deg`, `forced_deg`: largest violation of a constraint without and with a pushing client, negative inside.  `stop_deg_s`:
-    fastest impact at a hard stop.  `longest_ms`: longest control period at which the control law is stable.
+    with commands that act 1 or 3 ticks after they were computed; `field_mm`: depth of the deepest contact of fields (larger volumes that
+    cause repulsive forces) while they press; `pushed_mm`: depth of the deepest solid contact while a client (another program) pushes.
+    `chatter_mm`: oscillation of the palms at the table with commands 1 tick old, mean over the postures; `late_mm`: the same with commands
+    3 ticks old; `later_mm`: the same with commands 4 ticks old.  `clause_deg`, `forced_deg`: largest violation of a constraint without and
+    with a pushing client, negative inside.  `stop_deg_s`: fastest impact at a hard stop.  `longest_ms`: longest control period at which the
+    control law is stable.
     """
 
     settling_s: float  # median of steps of motors and postures
@@ -136,7 +138,11 @@ def evaluate(gains: Gains) -> Judged:
 
 @dataclass(frozen=True, slots=True)
 class Pressed:
-    """Depths of the deepest solid and field contact, and the chatter (oscillation) of the palms, while hands press into the table [m]."""
+    """Measures in m while hands press into the table.
+
+    `solid`, `field`: depth of the deepest contact of solids, and of fields (larger volumes that cause repulsive forces).  `chatter`:
+    oscillation of the palms, the larger of the two.
+    """
 
     solid: float
     field: float

@@ -9,8 +9,9 @@ Run time: five minutes on a quiet machine, nearly all of it PyBullet's.
 
 The robot is a black box: velocities are its inputs, noisy encoder positions its outputs.  First the method is checked on simulated motors
 with known parameters.  Signals that are not used in the fit check the result.  At the end an arm makes the same actions with PyBullet and
-with the offline plant.  The raw responses are in `responses/`, one file per motor; --resume continues an interrupted run after the last of
-them.  The run writes `identified.toml`, which is shipped in `mobee/simulation/identified/`.
+with the offline plant (the robot simulated in one process, with this motor model).  The raw responses are in `responses/`, one file per
+motor; --resume continues an interrupted run after the last of them.  The run writes `identified.toml`, which is shipped in
+`mobee/simulation/identified/`.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Fits the motor model (mobee.simulation.motors) to responses, and checks the method with simulated motors.
+"""Fits the motor model (mobee.simulation.motors) to responses (encoder values under known commands); checks the method in simulation.
 
 Lag, delay, backlash, friction and encoder noise of every motor are fitted.  The model is simulated for all motors at once, because the
 motors do not influence each other.  In the model, the response does not depend on the position in which a signal starts, so the mean of
@@ -197,7 +197,7 @@ def _delay_deviation(squares: Array, best: Array) -> Array:
 
 
 def known_motors(count: int, seed: int) -> MotorParameters:
-    """Draw random parameters of `count` motors.  Every third motor has no friction, and every fifth has no play.
+    """Draw random parameters of `count` motors.  Every third motor has no friction, and every fifth has no backlash.
 
     `seed`: of the draw.
     """

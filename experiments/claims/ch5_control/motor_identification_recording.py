@@ -86,7 +86,7 @@ def make_body(robot: Robot, seed: int) -> Backend:
 
 @contextmanager
 def prints_to_stderr() -> Iterator[None]:
-    """Redirect standard output to standard error in this context manager, because PyBullet prints a line for every scene from C."""
+    """Redirect standard output to standard error in this context manager, because PyBullet's C code prints a line for every scene."""
     sys.stdout.flush()
     kept = os.dup(1)
     os.dup2(2, 1)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Push disturbance: an external force at the robot's hand, against which MoBeE gives no guarantee.
 
-Claim: MoBeE protects the robot from itself, not from external energy (thesis 5.2, footnote 4: Justin "can sense when there is too much
-energy in the system ... and apply brakes"; MoBeE has "no such emergency stop").  Measured here: the smallest forces at the hand with which
-solid shapes touch, a constraint is violated, or a motor is driven into its stop, and whether the robot returns afterwards.  Source: thesis
-5.2, footnote 4.  Published: no numbers.  Run time: a minute.
+Claim: MoBeE protects the robot from itself, not from external energy (thesis 5.2, footnote 4: the robot Justin "can sense when there is too
+much energy in the system ... and apply brakes"; MoBeE has "no such emergency stop").  Measured here: the smallest forces at the hand with
+which solid shapes touch, a constraint is violated, or a motor is driven into its stop, and whether the robot returns afterwards.
+Source: thesis 5.2, footnote 4.  Published: no numbers.  Run time: a minute.
 
 A force acts at the left hand for 0.4 s while the controller holds the posture.  The force causes joint torques through J^T, which move the
 motors against inertia and friction.  Inertia and friction have the values of torque-controlled motors.  The controller senses only the
@@ -178,7 +178,10 @@ def _pushes(found: Cells) -> dict[tuple[str, str], list[dict[str, Any]]]:
 
 
 def plot(found: Cells) -> Any:
-    """Return a figure of distances and depths over the force, a column for each direction."""
+    """Return a figure with the force on the horizontal axis, and a column for each direction.
+
+    The rows are the largest distance of the hand from its start, the depth of the deepest contact of solids, and the hand's last distance.
+    """
     pushes = _pushes(found)
     directions = [name for name in DIRECTIONS if any(direction == name for _, direction in pushes)]
     drawing = new_figure(3.0 * len(directions), 7.0)

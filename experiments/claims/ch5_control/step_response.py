@@ -3,12 +3,12 @@
 
 Claim: with the default gains, at all control periods of 1 to 20 ms, single motors reach their targets and stay there within three seconds
 (steps of 20 degrees), and whole postures within six seconds (steps of up to half a range), with at most 5 % overshoot.  Source: thesis 5.2
-(the dynamical system of eq. 5.7); its figures show no step response.  Published number: an action of an arm took some 9.6 s, 18 000 in two
-days, three agents at once (thesis 7.3).  Run time: a few minutes.
+(the dynamical system of eq. 5.7); its figures show no step response.  Published number: an action of an arm took some 9.6 s: three agents
+at once made 18 000 actions each in two days (thesis 7.3).  Run time: a few minutes.
 
-Settling time: until the joint stays within 5 % of the step around its end position.  Error: distance of the end position from the
-attractor, which is not zero where a limit or a constraint pushes.  The true joint positions are measured, not the encoders; the motors have
-lag, delay, play and noise.
+Settling time: until the joint stays within 5 % of the step around its end position.  Error: distance of the end position from the attractor
+(the posture to which the control law pulls), which is not zero where a limit or a constraint pushes.  The true joint positions are
+measured, not the encoders; the motors have lag, delay, play and noise.
 """
 
 from __future__ import annotations
@@ -81,8 +81,8 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Run one step and measure it.  Returns the settings and the measurements as one dict.
 
     Main keys: "settling", time [s]; "overshoot", as a share of the step; "is_settled"; "error_deg", distance of the end position from the
-    attractor.  `settings`: "gains", their name; "period_ms", control period; "step", name of a motor, or "posture N" for a step of many
-    motors.  `seed`: of the plant.
+    attractor (the posture to which the control law pulls).  `settings`: "gains", their name; "period_ms", control period; "step", name of a
+    motor, or "posture N" for a step of many motors.  `seed`: of the plant.
     """
     step, gains = settings["step"], Gains.named(settings["gains"])
     if step.startswith(POSTURE):
@@ -112,9 +112,9 @@ def findings(found: Cells) -> dict[str, Any]:
 
     Under a gain set there is a dict from the control period and the kind of step, as "10 ms, motors" or "10 ms, postures", to a dict of
     numbers: the counts "steps" and "never_settled", and for "settling_time_s", "overshoot" (share of the step), "error_deg" (distance of
-    the end position from the attractor) and "rest_deg" (standard deviation in the last second) a list of the median and the worst value.
-    "each": the text "median and worst".  "passed": whether all steps with the default gains settle, with at most 5 % overshoot, within 3 s
-    (single motor) or 6 s (posture); None if the default gains were not run.
+    the end position from the goal of the step) and "rest_deg" (standard deviation in the last second) a list of the median and the worst
+    value.  "each": the text "median and worst".  "passed": whether all steps with the default gains settle, with at most 5 % overshoot,
+    within 3 s (single motor) or 6 s (posture); None if the default gains were not run.
     """
     responses = _responses(found)
     table: dict[str, Any] = {}

@@ -3,15 +3,16 @@
 
 Claim: an agent that detects changes of outcomes by their run lengths corrects its model sooner than agents that forget at a fixed rate, and
 is as accurate as one that forgets nothing in a world that does not change.
-Source: aim of this reproduction, to thesis 7.2.6.  Published number: none.
+Source: aim of this reproduction; it extends thesis 7.2.6, about changed outcomes.  Published number: none.
 Run time: half a minute on 2 cores.
 
-The world is a table of outcomes: the lattice of rank 3 (81 states), with actions to the states one level away along one joint; every action
-succeeds.  After 2000 transitions a random state and two of its neighbours are blocked: all actions towards these states end in the state in
-which they began.  1000 more transitions follow.  The error of the model is the mean L1 distance between its outcome probabilities (by the
-observed counts, without the imagined outcomes of the prior) and the true ones; it is computed for the actions into blocked states, and for
-all other actions.  In half of the runs nothing changes.  The agent that detects changes estimates the run length of each action: the number
-of observations of this action since its outcomes changed last.  It forgets older observations.
+The world is a table of outcomes: the lattice with three levels of four joints (81 states), with actions to the states one level away along
+one joint; every action succeeds.  After 2000 transitions a random state and two of its neighbours are blocked: all actions towards these
+states end in the state in which they began.  1000 more transitions follow.  The error of the model is the mean L1 distance between its
+outcome probabilities (from the observed counts and a weak prior) and the true ones; it is computed for the actions into blocked states, and
+for all other actions, without those that start in a blocked state.  In half of the runs nothing changes.  The agent that detects changes
+estimates the run length of each action: the number of observations of this action since its outcomes changed last.  It forgets older
+observations.
 """
 
 from __future__ import annotations
@@ -69,10 +70,10 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Let one agent explore before and after the change, and measure the error of its model.
 
     Returns `errors` (checks + 1, 2), mean L1 errors against the outcomes after the change.  Row 0 is measured at the change, row i after i
-    further periods of 20 transitions.  Column 0: changed actions (0 in a world that does not change); column 1: all other actions.  `tries`
-    is the mean number of tries of a changed action since the change, divided by the mean of all actions that do not start in a blocked
-    state (1 in a world that does not change).  `settings`: "agent", a key of AGENTS; "changed", whether the world changes; "before" and
-    "after", numbers of transitions.  `seed`: of agent and world.
+    further periods of 20 transitions.  Column 0: changed actions (0 in a world that does not change); column 1: all other actions that do
+    not start in a blocked state.  `tries` is the mean number of tries of a changed action since the change, divided by the mean of all
+    actions that do not start in a blocked state (1 in a world that does not change).  `settings`: "agent", a key of AGENTS; "changed",
+    whether the world changes; "before" and "after", numbers of transitions.  `seed`: of agent and world.
     """
     space, rng = arm_space(), np.random.default_rng([seed, 726])
     middle = int(rng.integers(len(space)))

@@ -125,10 +125,11 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Let one agent explore before and after the change, and measure its model after every 50 transitions.
 
     Returns `seen` (T, 3), the transitions: state, action, state reached.  `series` (checks, 4): the mean L1 error of the changed and of the
-    unchanged actions, then the mean value [nats] of the changed and of the unchanged actions.  `at_change`: the mean L1 error of the
-    changed actions against their new outcomes, before any transition in the changed world.  `changed`, `same`: the masks (S, A) of
-    `compare`.  Raises InvalidValue if no action is changed.  `settings`: "change", a key of CHANGES; "explorer"; "forgetting", the factor
-    with which the agent forgets; "transitions", their number before the change, and after it.  `seed`: of agent and plant.
+    unchanged actions, then the mean value (discounted sum of expected information gains) of the changed and of the unchanged actions
+    [nats].  `at_change`: the mean L1 error of the changed actions against their new outcomes, before any transition in the changed world.
+    `changed`, `same`: the masks (S, A) of `compare`.  Raises InvalidValue if no action is changed.  `settings`: "change", a key of CHANGES;
+    "explorer"; "forgetting", the factor with which the agent forgets; "transitions", their number before the change, and after it.  `seed`:
+    of agent and plant.
     """
     change, known = settings["change"], truths(settings["change"])
     changed, same = compare(*known)
@@ -172,9 +173,9 @@ class Run:
     """The results of one run: its model was checked after every 50 transitions, and the world changed in the middle.
 
     `tried` (checks,): number of transitions with a changed action since the previous check.  `series` (checks, 4): mean L1 error of the
-    changed and of the unchanged actions, then mean value [nats] of the changed and of the unchanged actions.  `at_change`: mean L1 error of
-    the changed actions against their new outcomes, before any transition in the changed world.  `changed`, `same`: masks (S, A) of the
-    changed and the unchanged actions.
+    changed and of the unchanged actions, then mean value (discounted sum of expected information gains) of the changed and of the unchanged
+    actions [nats].  `at_change`: mean L1 error of the changed actions against their new outcomes, before any transition in the changed
+    world.  `changed`, `same`: masks (S, A) of the changed and the unchanged actions.
     """
 
     tried: Ints

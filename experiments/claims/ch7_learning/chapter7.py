@@ -32,7 +32,10 @@ _TIMES, _FAILURE = "seconds.json", "failed.txt"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add --only and --all, and the options --seeds, --jobs, --engine and --quick, which are passed on to all experiments."""
+    """Add --only (names of experiments) and --all (also those beyond the chapter), and the options that all experiments get.
+
+    These are --seeds, --jobs, --engine and --quick.
+    """
     parser.add_argument("--only", nargs="+", metavar="NAME", help=f"of {', '.join((*CHAPTER7, *BEYOND))}")
     parser.add_argument("--all", action="store_true", help=f"also {', '.join(BEYOND)}")
     parser.add_argument("--seeds", type=positive_whole, metavar="N", help="repetitions (default: each experiment's own)")

@@ -7,11 +7,11 @@ some actions towards them fail.  Actions from these states are tried less often;
 ahead (larger discount).  An agent that expects success (60-40) tries the failing actions most often.  Source: thesis 7.2.2 to 7.2.5, figs.
 7.4, 7.6 and 7.7; 5 runs per setting.  Run time: 2 minutes on 2 cores.
 
-The left arm with its cable constraints and self-contacts, from a random state; discounts 0.5, 0.9 and 0.99, both priors, until every
-state-action was tried 5 times.  A state-action fails when it does not end in its goal state.  Actions are written as source->goal, because
-the thesis numbers the state-actions without saying in which order.  The texts do not say below which speed an action has settled, nor how
-strong the forces of the cable constraints are.  So all runs are repeated with the extreme values that the original programs suggest: settle
-speeds of 0.6 and 1.2 deg/s, and a largest force of 1300 deg/s^2.
+The agent moves the left arm, with its cable constraints and self-contacts, from a random state until every state-action was tried 5 times;
+discounts are 0.5, 0.9 and 0.99, with both priors.  A state-action fails when it does not end in its goal state.  Actions are written as
+source->goal, because the thesis numbers the state-actions without stating their order.  The thesis and the paper do not state below which
+speed an action has settled (ended), nor how strong the forces of the cable constraints are.  So all runs are repeated with the extreme
+values that the original programs suggest: settle speeds of 0.6 and 1.2 deg/s, and a largest force of 1300 deg/s^2.
 """
 
 from __future__ import annotations
@@ -63,8 +63,8 @@ Action = tuple[int, int]  # source and goal state
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
     """Return the settings of the runs: one for each law, prior ("50-50", "60-40") and discount (0.5, 0.9, 0.99).
 
-    A law is the published control law, or the same law with another settle speed or cable force.  With --quick, only the published law is
-    run, and a run ends when each action was tried once instead of 5 times.
+    A law is the published control law, or the same law with another settle speed (below which an action has settled) or cable force.  With
+    --quick, only the published law is run, and a run ends when each action was tried once instead of 5 times.
     """
     least, name = (1, "quick-") if arguments.quick else (MIN_TRIES, "")
     return [
@@ -93,7 +93,7 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def summary(values: dict[str, Any]) -> dict[str, Any]:
-    """Reduce the values of `trial` for the raw record: counts replace the transitions `seen`.
+    """Reduce the values of `trial` for the raw record (files that are kept in the repository): counts replace the transitions `seen`.
 
     Returns `visits` (81,) of the states, `failures` and `tries` (81, 8) of the actions, and the `values` (81, 8) [nats] at the end.
     """

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Put a cup beside a curious arm whose state contains the place of the cup, and let the arm push the cup to chosen cells.
+"""Put a cup beside the arm of a curious agent whose state contains the place of the cup, and let the arm push the cup to chosen cells.
 
 Claim: a curious agent whose state contains the place of a cup moves the cup more often than an agent that perceives only a ghost of the
 cup.  With what it has learned it pushes the cup to a chosen cell more often than by chance.
-Source: aim of this reproduction, the table discovery of paper 3.2 one step further.  Published number: none.
+Source: aim of this reproduction; it extends the discovery of a table in paper 3.2.  Published number: none.
 Run time: 4 minutes of processor time.
 
 The left arm has 15 postures in which the hand is low above the table, and the cup can be in nine cells of 5 x 8 cm: 135 states, 396
@@ -136,7 +136,7 @@ ROW: dict[str, Callable[[Mapping[str, Any]], float]] = {
 
 
 def pushed(runs: Runs) -> dict[str, list[float]]:
-    """Return how often the cup was pushed to the chosen cell: by planned and by random actions, a list with the share of each run.
+    """Return for each choice of actions a list with the share of tries, in each run, in which the cup was pushed to the chosen cell.
 
     The key "AGENT, then plans" (with the name of an agent) is for tries that follow plans with the model that this agent has learned; the
     key "random actions" is for tries with random actions.

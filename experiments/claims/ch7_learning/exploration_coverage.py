@@ -83,7 +83,7 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
     """Return the settings of the runs: every explorer on both graphs, for the arm with and without constraints.
 
     On the published graph ("nearest") the curious agent also runs with the discounts 0.5 and 0.99.  With --quick only the graph of
-    equidistant neighbours is explored.
+    equidistant neighbours is explored; its actions lead to the states one level away along one joint.
     """
     few = tuple(range(arguments.seed, arguments.seed + min(arguments.seeds, FEW_SEEDS)))
     published = [("nearest", *one, DISCOUNT) for one in product(WORLDS, EXPLORED_BY)]
@@ -185,8 +185,8 @@ def _agent(explorer: str, discount: float) -> str:
 def summary(values: dict[str, Any]) -> dict[str, Any]:
     """Reduce the values of `trial` for the raw record: `gaps` replaces `new_actions`.
 
-    `gaps` (E,) is the number of transitions from each first try of an action to the first try of the next new action.  Most gaps are 1, so
-    they take little space.
+    `gaps` (E,) is, for each first try of an action, the number of transitions since the previous first try, or since the start.  Most gaps
+    are 1, so they take little space.
     """
     kept = {name: value for name, value in values.items() if name != "new_actions"}
     return kept | {"gaps": np.diff(values["new_actions"].astype(np.intp), prepend=0).astype(np.uint16)}
@@ -332,10 +332,11 @@ near_floor = {
     "at most 1.01",
 )
 def depletes(published: Published) -> Measured | None:
-    """Judge whether "depleting" needs at most 1.01 times the transitions of "nearest_untried" to try every action, in both worlds.
+    """Judge whether "depleting" needs at most 1.01 times the transitions of "nearest_untried" to try every action.
 
-    `published`: runs on the published graph by (world, agent).  Returns the ratio of these numbers of transitions in each world as text,
-    and the verdict.  Returns None if one of the two explorers was not run.
+    Both explorers are ours (see the module's docstring).  `published`: runs on the graph of the 16 nearest neighbours, by (world, agent).
+    Worlds: "constrained" and "free", the arm with and without constraints and contacts; both are judged.  Returns the ratio of these
+    numbers of transitions in each world as text, and the verdict.  Returns None if one of the two explorers was not run.
     """
     if any((world, name) not in published for world in FLOORS for name in ("depleting", "nearest_untried")):
         return None

@@ -5,10 +5,10 @@ Claim: after 4000 transitions the curious agent's visits of states and tries of 
 least-tried exploration, except for spikes at the actions that run into constraints.
 Source: paper 3.1, fig. 5 (one run of the real robot per explorer).  No numbers are published.  Run time: 2 minutes on 2 cores.
 
-The left arm with its cable constraints and self-contacts; 81 states with actions to their 16 nearest neighbours, and for comparison to
-their equidistant ones.  Ties among the 16 nearest are drawn once: all runs share that graph, and the numbers may depend on it.  Actions at
-constraints are those that failed in more than half of all their tries, in the runs of all explorers on a graph together.  When a run is
-judged, its own tries are left out.
+The left arm, with its cable constraints and self-contacts, has 81 states.  Actions lead to the 16 nearest states; in other runs, for
+comparison, to the equidistant neighbours, the states one level away along one joint.  Ties among the 16 nearest are drawn once: all runs
+share that graph, and the numbers may depend on it.  Actions at constraints are those that failed in more than half of all their tries, in
+the runs of all explorers on a graph together.  When a run is judged, its own tries are left out.
 """
 
 from __future__ import annotations
@@ -71,7 +71,10 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def summary(values: dict[str, Any]) -> dict[str, Any]:
-    """Reduce the values of `trial` for the raw record: the transitions `seen` are sorted, because only their counts are needed."""
+    """Reduce the values of `trial` for the raw record: the transitions `seen` are sorted, because only their counts are needed.
+
+    The raw record is an archive of the run's files in the repository.
+    """
     return {"seen": in_order(values["seen"])}
 
 

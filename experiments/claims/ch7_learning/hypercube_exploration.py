@@ -6,9 +6,10 @@ smallest possible number of transitions; tries and values become uniform; and th
 Source: thesis 7.1, figs. 7.2 and 7.3, table 7.1; the rewards of table 6.2.  Published number: 320 actions (64 x 5).
 Run time: 10 seconds on 2 cores.
 
-The left arm with its cable constraints and self-contacts, from a random state; discounts 0.5, 0.9 and 0.99, and both initialisations of the
-counts (50-50: one imagined failure and one success; 60-40: one failure and two successes), because thesis 7.1 names none.  Numbers are
-those of 50-50 unless stated otherwise.
+The states are the 16 poses with each of four joints at 25 or 75 % of its range.  The left arm, with its cable constraints and
+self-contacts, explores from a random state.  Runs are made with the discounts 0.5, 0.9 and 0.99, and with both initialisations of the
+counts of outcomes (50-50: one imagined failure and one success; 60-40: one failure and two successes), because thesis 7.1 names none.
+Numbers are those of 50-50 unless stated otherwise.
 Tries and values are recorded after 50 transitions and at the end.  The relative variance of tries is their variance divided by that of a
 uniformly random choice among 64 actions: 1 for a random choice, 0 for equal tries.  The limit of the value is mean reward / (1 - discount),
 the value of earning the mean reward indefinitely.
@@ -52,9 +53,10 @@ Priors = Mapping[str, Groups]  # by initialisation
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return the settings of the runs: both initialisations ("50-50", "60-40") with the discounts 0.5, 0.9 and 0.99.
+    """Return the settings of the runs: two initialisations of the counts of outcomes, with the discounts 0.5, 0.9 and 0.99.
 
-    The runs are so short that --quick changes nothing.
+    "50-50": one imagined failure and one success; "60-40": one failure and two successes.  The runs are so short that --quick changes
+    nothing.
     """
     return grid(initial=INITIAL, discount=DISCOUNTS)
 
@@ -180,7 +182,7 @@ CLAIMS = (succeed, actions, uniform, flat, proportional)
 
 
 def by_prior(found: Cells) -> Priors:
-    """Group the values of the finished runs by initialisation ("50-50", "60-40"), then by discount; each group is sorted by seed."""
+    """Group the values of the finished runs by initialisation of the counts, then by discount; each group is sorted by seed."""
     grouped = grouped_by(found, "initial", "discount")
     return {
         initial: {d: grouped[initial, d] for d in DISCOUNTS if (initial, d) in grouped}
@@ -192,9 +194,9 @@ def by_prior(found: Cells) -> Priors:
 def findings(found: Cells) -> dict[str, Any]:
     """Return the results as a dict with two keys, "runs" and "claims".
 
-    "runs" is a dict from "initialisation, discount" to a row of numbers: "seeds", "actions_until_all_tried_5_times" with its interval "low"
-    to "high", and others about tries and values.  "claims" is a list with the claims, their measured values and their verdicts, as dicts
-    (`Claim.record`).
+    "runs" is a dict from "initialisation, discount" to a row of numbers: "seeds", "actions_until_all_tried_5_times" with the ends "low" and
+    "high" of its confidence interval, and others about tries and values.  "claims" is a list with the claims, their measured values and
+    their verdicts, as dicts (`Claim.record`).
     """
     priors = by_prior(found)
     return {

@@ -139,8 +139,9 @@ def tries_to_prefer(part: str, divergence: str, kind: str) -> float:
     """Return the mean number of tries after which an action of the kind `kind` has a larger reward than a reliable action.
 
     Both actions are tried equally often, and the rewards of their last tries are compared.  A reward is larger if it exceeds the other by
-    more than 5 %.  `part`: "left_arm" or "torso".  `divergence`: the one that defines the reward, "kail" or "kl".  `kind`: "failing" or
-    "uncertain".  Returns inf if 30 tries were not enough in one of the simulations.
+    more than 5 %.  `part`: "left_arm" or "torso".  `divergence`: the one that defines the reward, "kail" (thesis 6.4.2) or "kl", plain KL
+    with a uniform prior.  `kind`: "failing" (never ends in its goal) or "uncertain" (ends in one of three states).  Returns inf if 30 tries
+    were not enough in one of the simulations.
     """
     other = rewards(part, divergence, KINDS[kind])
     plain = rewards(part, divergence, reliable, repeats=1)[0]

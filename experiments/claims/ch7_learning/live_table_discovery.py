@@ -6,14 +6,15 @@ that do not differ statistically from those of the same agents on the offline pl
 Source: aim of this reproduction (thesis 7.4 was done live).  Published number: none.  Run time: 10 minutes on 2 cores, and 13 for each live
 run.
 
-The robot is `icub` with the published gains and graphs; contact forces act on all motors up to the root of the robot.  The live robot is
-its motor model, or with --robots PyBullet or MuJoCo; the motor parameters of the offline plant were identified on PyBullet.  The models are
-compared by the total variation between the outcomes of a live run and those of all offline runs except one, which are taken together.  Each
-offline run is left out in turn, and the results are averaged.  The variation is a mean over the state-actions that both sides tried at
-least twice.  For comparison, the variation between each offline run and all others is computed, too.  Touch is the share of the arms'
-actions that ended in contact with table or ball.  Lean is the mean number of tries of the torso's actions that lean forward, divided by the
-mean number of tries of its other actions.  Both are measured in the second half of a run.
-With the same encoder noise the live and the offline plant make exactly the same run (`mobee bench agree`); here they have different seeds.
+The robot is `icub` with the published gains and graphs; contact forces act on all motors up to the root of the robot.  The offline plant
+simulates the robot in one process.  The live robot is simulated by a motor model, or with --robots by PyBullet or MuJoCo; the motor
+parameters of the offline plant were identified on PyBullet.  The models are compared by the total variation between the outcomes of a live
+run and those of all offline runs except one, which are taken together.  Each offline run is left out in turn, and the results are averaged.
+The variation is a mean over the state-actions that both sides tried at least twice.  For comparison, the variation between each offline run
+and all others is computed, too.  Touch is the share of the arms' actions that ended in contact with table or ball.  Lean is the mean number
+of tries of the torso's actions that lean forward, divided by the mean number of tries of its other actions.  Both are measured in the
+second half of a run.  With the same encoder noise the live and the offline plant make exactly the same run (`mobee bench agree`); here they
+have different seeds.
 """
 
 from __future__ import annotations
@@ -66,7 +67,7 @@ LIVE_COST = 5.0  # of a live run, relative to an offline one
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options of a sweep, and --live-seeds, --robots and --transitions."""
+    """Add --seeds, --jobs, --engine, --quick, --live-seeds (live runs), --robots (simulators of live runs) and --transitions (per part)."""
     sweep_arguments(parser, seeds=SEEDS)
     text = f"live runs on each robot, one after the other (default: {LIVE_SEEDS})"
     parser.add_argument("--live-seeds", type=positive_whole, default=LIVE_SEEDS, metavar="N", help=text)

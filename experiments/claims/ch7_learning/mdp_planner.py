@@ -6,14 +6,13 @@ need a static workspace, while a PRM planner does.  A planner trained with dynam
 Source: paper 2, 3.1, 3.2.1, fig. 7; thesis 7.4.1.  Published: no numbers but the figure's seven state-actions that lead elsewhere.
 Run time: two minutes on 2 cores.
 
-The left arm of the published robot learns on 81 states with 16 neighbours: 4000 curious transitions without the table ("still") or with a
-table that is moved up or down at random after every ten actions ("moving"); or 2000 transitions without the table before it is raised
-("enters").  Then the model is tested in 60 queries, pairs of a start and a goal state.  It learns nothing from them, and plans again after
-each action, with debiased counts (observed counts and a weak prior, without the imagined outcomes of the learner).  In each query the arm
-would touch the raised table on the straight path from start to goal, but not in the start or in the goal.  For comparison the same lattice
-is used as a roadmap that was verified without the table.  Its path is planned once, or the roadmap is repaired when a motion fails, only
-for this query ("repairs") or for all later queries too ("remembers").
-The seeds draw noise and queries; all runs share one graph.
+The left arm of the published robot learns on 81 states with 16 neighbours: 4000 transitions of a curious agent without the table ("still")
+or with a table that is moved up or down at random after every ten actions ("moving"); or 2000 transitions without the table before it is
+raised ("enters").  Then the model is tested in 60 queries, pairs of a start and a goal state.  It learns nothing from them, and plans again
+after each action, with debiased counts (observed counts and a weak prior, weaker than that of learning).  In each query the arm would touch
+the raised table on the straight path from start to goal, but not in the start or in the goal.  For comparison the same lattice is used as a
+roadmap that was verified without the table.  Its path is planned once, or the roadmap is repaired when a motion fails, only for this query
+("repairs") or for all later queries too ("remembers").  The seeds draw noise and queries; all runs share one graph.
 """
 
 from __future__ import annotations
@@ -100,7 +99,10 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def summary(values: dict[str, Any]) -> dict[str, Any]:
-    """Reduce the values of `trial` for the raw record: transitions `seen` are sorted, because only their counts are needed."""
+    """Reduce the values of `trial` for the raw record (the archive of a run): the transitions `seen` are sorted.
+
+    Only the number of transitions of each kind is needed.
+    """
     return values | ({"seen": in_order(values["seen"]).astype(np.uint8)} if "seen" in values else {})
 
 
@@ -130,7 +132,8 @@ def fates(model: TransitionModel) -> dict[str, int]:
     """Count where the state-actions end, for all state-actions that were tried at least twice.
 
     The keys are "tried", the number of all these state-actions; "goal", of those that end in their goal with a probability of at least 0.8;
-    "elsewhere", of those that end in one other state with a probability of at least 0.8; and "sometimes", of the rest.
+    "elsewhere", of those that end in one other state (which may be their start) with a probability of at least 0.8; and "sometimes", of
+    the rest.
     """
     beliefs, space = model.debiased(), model.space
     tried = model.tries >= MIN_TRIES
@@ -149,7 +152,7 @@ Runs = Mapping[tuple[str, float | None], list[dict[str, Any]]]  # values by cond
 def runs_of(found: Cells) -> Runs:
     """Group the values of the finished runs by (training, forgetting), each group sorted by seed.
 
-    Training is "still", "moving", "enters" or "roadmap"; forgetting is None except for "enters".
+    Training is "still", "moving", "enters" or "roadmap", as explained at `trial`; forgetting is None except for "enters".
     """
     runs: dict[tuple[str, float | None], list[dict[str, Any]]] = {}
     for result in sorted(found.values(), key=lambda result: result.cell.seed):

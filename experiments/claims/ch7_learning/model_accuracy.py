@@ -1,18 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """Measure the error of learned transition models, for several explorers, with and without imagined outcomes.
 
-Claim: curiosity learns the stochastic actions better than least-tried exploration, and the error of counts without imagined outcomes
-(debiased counts) is about a tenth of that of the thesis' counts.  Source: aims of this reproduction; the thesis calls the exploration
-"data-efficient" (7.2.1) without measuring the model.  No numbers are published.  Run time: 3 minutes on 2 cores.
+Claim: curiosity learns the stochastic actions better than least-tried exploration.  The error of counts without imagined outcomes
+(debiased counts) is about a tenth of that of the thesis' counts, which include them: pseudo-counts from before the first try of an action.
+Source: aims of this reproduction; the thesis calls the exploration "data-efficient" (7.2.1) without measuring the model.  No numbers are
+published.  Run time: 3 minutes on 2 cores.
 
 The error of a state-action is the L1 distance, 0 to 2, between the believed and the true distribution of outcomes.  There are three worlds:
 the left arm on 81 and on 256 states (20-80 % of the ranges), with equidistant neighbours (states one level away along one joint), and a
 world that is defined by a table of outcome probabilities, so that the truth is known exactly.  In this world a plane separates three of 81
 states from the others ("half-space").  The arm's true outcomes are estimated by walks that try every action 80 or 40 times.  An action is
 stochastic if its most likely outcome has a probability below .9: none of 432 on the arm with 81 states, some 25 of 1536 with 256, 13 of 432
-in the half-space.  The truth that is estimated from so few tries has itself an error, some .1 for two equally likely outcomes.  Even a
-perfect model would have this measured error.  Therefore the measured ratio of a large to a small error is smaller than the real ratio, for
-the stochastic actions of the arm.
+in the half-space.  The walks have few tries, so their estimate has itself an error, some .1 for two equally likely outcomes.  Even a
+perfect model would have this measured error.  Therefore, for the stochastic actions of the arm, the measured ratio of two models' errors
+(the larger over the smaller) is smaller than the true ratio.
 """
 
 from __future__ import annotations
@@ -45,7 +46,8 @@ class World:
     """A lattice with the explorers that run on it.
 
     `text`: name in tables.  `levels`: samples of each joint, as shares of its range.  `explorers`: names of explorers.  `transitions`:
-    length of their runs.  `tries`: tries of each action in the walks that measure the true outcomes; 0 if a table defines the outcomes.
+    length of their runs.  `tries`: tries of each action in each of the two walks that measure the true outcomes; 0 if a table defines the
+    outcomes.
     """
 
     text: str
@@ -72,28 +74,36 @@ COUNTS, DEBIASED, DEBIASED_STOCHASTIC = 0, 2, 3
 
 @cache
 def space_of(world: str) -> Lattice:
-    """Return the lattice of a world ("half-space", "rank3" or "rank4"), with equidistant neighbours."""
+    """Return the lattice of a world ("half-space", "rank3" or "rank4"); an action leads to a state one level away along one joint.
+
+    "half-space" and "rank3" have 3 levels of each of the four joints (81 states), "rank4" has 4 levels (256 states).
+    """
     return arm_space(WORLDS[world].levels)
 
 
 def plant_of(world: str) -> Callable[[int], Plant]:
-    """Return the function that makes the plant of a world ("half-space", "rank3" or "rank4") from a seed."""
+    """Return the function that makes the plant of a world from a seed.
+
+    `world`: "half-space", a table of outcome probabilities; "rank3" or "rank4", the left arm on a lattice with 3 or 4 levels per joint.
+    """
     return arm_plant if WORLDS[world].tries else half_space_plant
 
 
 def half_space_plant(seed: int) -> TabularPlant:
-    """Return a tabular plant of 81 states in which a half-space separates the states 24, 51 and 78 from the others.
+    """Return a plant of 81 states with a table of outcome probabilities; a plane in joint space cuts off the states 24, 51 and 78.
 
-    `seed`: of the random outcomes.
+    Only the actions towards these states are stochastic: their most likely outcome has a probability below 0.9.  `seed`: of the random
+    outcomes.
     """
     space = space_of("half-space")
     return TabularPlant(space, *half_space(space), seed)
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return the settings of the runs: walks that measure the arm's true outcomes, and every explorer in its worlds.
+    """Return the settings of the runs: walks on the arm's lattices, and for each world its explorers.
 
-    With --quick only the world "half-space" is explored, which needs no walk.
+    A walk tries every action equally often, to measure the true outcomes.  With --quick only the world "half-space" is explored, whose
+    true outcomes are known without a walk.
     """
     worlds = {name: world for name, world in WORLDS.items() if not (arguments.quick and world.tries)}
     walks = [
@@ -193,10 +203,10 @@ def findings(found: Cells) -> dict[str, Any]:
 
 
 def truth_error(truth: OutcomeModel) -> float | None:
-    """Return the expected L1 error of the true outcomes themselves, which walks estimate from few tries; mean over the stochastic actions.
+    """Return the expected L1 error of the walks' estimate of the true outcomes, which has few tries; mean over the stochastic actions.
 
-    Returns 0 if a table defines the outcomes, None if no action is stochastic.  A stochastic action has no outcome with a probability of
-    0.9 or more.
+    `truth`: the estimate, or a table that defines the outcomes; then the error is 0.  Returns None if no action is stochastic.  A
+    stochastic action has no outcome with a probability of 0.9 or more.
     """
     stochastic = most_likely(truth) < CERTAIN
     if not stochastic.any():

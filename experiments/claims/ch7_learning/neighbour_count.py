@@ -4,12 +4,12 @@
 Claim: the published 16 neighbours per state are more than necessary; fewer connections would shorten the learning time.
 Source: paper 4.1 (an impression, no numbers).  Run time: 4 minutes on 2 cores.
 
-The left arm with its cable constraints and self-contacts learns by curiosity on graphs of 81 states, with actions to the 4 to 32 nearest
-states (among equally near ones a draw decides, anew for every seed) or to the equidistant neighbours (states one level away along one
-joint).  After fixed numbers of transitions, the learned model is tested in 60 tasks, random pairs of states, which are the same for all
-graphs: follow the plan until the arm is in the goal state, with at most 12 actions.  The plant of the tests has other random noise than the
-plant of the learning.  A task is solved directly if it takes the fewest actions that its graph allows.  The learning time is the number of
-transitions until every state-action was tried once.
+The left arm with its cable constraints and self-contacts learns by curiosity on graphs of 81 states (postures of four joints), with actions
+to the 4 to 32 nearest states (among equally near ones a draw decides, anew for every seed) or to the equidistant neighbours (states one
+level away along one joint).  After fixed numbers of transitions, the learned model is tested in 60 tasks, random pairs of states, which are
+the same for all graphs: follow the plan until the arm is in the goal state, with at most 12 actions.  The plant of the tests has other
+random noise than the plant of the learning.  A task is solved directly if it takes the fewest actions that its graph allows.  The learning
+time is the number of transitions until every state-action was tried once.
 """
 
 from __future__ import annotations
@@ -45,9 +45,10 @@ Groups = Mapping[int | str, list[Run]]  # by graph
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return the settings of the runs: one for each graph, with 4 to 32 or with equidistant neighbours per state.
+    """Return the settings of the runs: one for each graph, with 4 to 32 nearest or with equidistant neighbours.
 
-    With --quick the agents learn for 1000 instead of 4000 transitions.
+    Equidistant neighbours of a state are one level away along one joint.  With --quick the agents learn for 1000 instead of 4000
+    transitions.
     """
     budgets = list(BUDGETS[:3] if arguments.quick else BUDGETS)
     return [Condition(f"k{graph}-n{budgets[-1]}", {"graph": graph, "budgets": budgets, "tasks": TASKS}) for graph in GRAPHS]
@@ -246,7 +247,7 @@ CLAIMS = (sooner, denser, longer)
 
 
 def plot(found: Cells) -> Any:
-    """Draw success of the tasks, number of actions and learning time over the number of neighbours.
+    """Draw the share of tasks solved directly, the number of actions and the learning time over the number of neighbours.
 
     Returns a matplotlib figure.
     """

@@ -62,7 +62,7 @@ def _middle(top: float) -> tuple[float, float, float]:
 
 
 class FrozenModel:
-    """A planner that plans again with a fixed transition model after each action, and does not learn.
+    """A planner that computes the best action of every state for the goal of a query, with a fixed transition model, and does not learn.
 
     It implements the protocol experiments.kit.learning.arm_planners.Rival.
     """
@@ -113,7 +113,8 @@ class Queries:
     """The queries of a seed: `pairs` of a start state and a goal state of the lattice `space`.
 
     `blocked` (S,): whether the arm touches the raised table when it is in the sample of a state (the pose that stands for this state).  A
-    contact of the fields, larger volumes that cause repulsive forces, is enough.
+    contact of the fields, larger volumes that cause repulsive forces, is enough.  False also if the arm touches something, or is near a
+    cable constraint, with the lower table.
     """
 
     space: Lattice
@@ -169,7 +170,8 @@ def touched_states(plant: TablePlant, space: Lattice, top: float) -> NDArray[np.
 def drawn_pairs(plant: TablePlant, space: Lattice, count: int, seed: int) -> list[tuple[int, int]]:
     """Draw up to `count` pairs of states whose straight path in joint space is blocked by the raised table, and by nothing else.
 
-    In neither of the two states the arm touches the raised table.  Afterwards the table is at its lower height.  `seed`: of the draw.
+    In the samples of both states (the poses that stand for them) the arm touches nothing, even if the table is raised.  Afterwards the
+    table is at its lower height.  `seed`: of the draw.
     """
     free = np.flatnonzero(~touched_states(plant, space, UP))
     every = list(permutations(free.tolist(), 2))

@@ -49,8 +49,9 @@ MIN_DEFLECTED, MIN_FAILING = 0.9, 0.5  # shares of tries
 class Variant:
     """A plant of the left arm that differs from the published one in some parameters.
 
-    `gains`, `settle`, `motors`: changed fields of the gains, of their settle test and of the motor parameters, by name.  `dt`: control
-    period [s].  `gain_set`, `motor_set`, `robot`: functions that return the gains, the motor parameters and the robot before these changes.
+    `gains`, `settle`, `motors`: changed fields of the gains, of their settle test (it ends an action) and of the motor parameters, by name.
+    `dt`: control period [s].  `gain_set`, `motor_set`, `robot`: functions that return the gains, the motor parameters and the robot before
+    these changes.
     """
 
     gains: dict[str, Any] = field(default_factory=dict)
@@ -159,7 +160,10 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def summary(values: dict[str, Any]) -> dict[str, Any]:
-    """Reduce the values of `trial` for the raw record: the transitions are sorted, because only their counts are needed."""
+    """Reduce the values of `trial` for the raw record: the transitions are sorted, because only their counts are needed.
+
+    The raw record is an archive of the run's files in the repository.
+    """
     return values | {lattice: in_order(values[lattice]) for lattice in LEVELS}
 
 

@@ -4,9 +4,9 @@
 Claim: the curious agent's reward decays uniformly over the state-actions, because the agent goes wherever the reward is high.
 Source: paper 3.1, fig. 6 (snapshots, no numbers).  Run time: 1 minute on 2 cores.
 
-The left arm with its cable constraints and self-contacts; 81 states with 16 neighbours, one graph for all runs, 4000 transitions. The mean
-and the largest reward of all state-actions are measured after fixed numbers of transitions, for curious, least-tried and random
-exploration.  The reward is the information gain that the model expects of an action.
+The left arm, with its cable constraints and self-contacts, makes 4000 transitions between 81 states with 16 neighbours each, on the same
+graph in all runs.  The mean and the largest reward of all state-actions are measured after fixed numbers of transitions, for curious,
+least-tried and random exploration.  The reward is the information gain that the model expects of an action.
 """
 
 from __future__ import annotations

@@ -3,16 +3,17 @@
 
 Claim: the transition model learned offline, with motor parameters that were identified on PyBullet and then frozen, is that of PyBullet's
 robot.  Source: an aim of this reproduction; the paper (4.1) says that the robot's time limits learning.
-Published: no number.  Run time: about fifteen minutes on 2 cores for the arms, and as long again for the table.
+Published: no number.  Run time: about fifteen minutes on 2 cores for the arms, and as long again with --table.
 
-Curious agents of both arms of the robot `icub` learn at the same time, on lattices of rank 3 with four neighbours, under the gains of 2014;
-with --table also agents of torso and arms at the table.  Live: all services run in lockstep, with PyBullet; for comparison also with MuJoCo
-and with the motor model alone.  Offline: the same agents learn with five other seeds.  Each offline seed is compared with the other four;
-this distance is the noise that a perfect copy would show too.  Therefore a live robot is also compared with four offline seeds at a time.
-It counts as equal if its distance is at most 0.01, or at most the upper bound for one more offline seed (whose distance would be below this
-bound with a probability of 95 %).  If the bound is more than 0.02 (the margin of equivalence) above the mean distance of the offline seeds,
-these differ too much for a verdict.  One live run can show that the models differ, but not that they are equivalent: then the claim stays
-open.  Both engines simulate masses, contacts of solids and hard stops; the offline plant simulates motors and repulsive fields.
+Curious agents of both arms of the robot `icub` learn at the same time, on lattices with three levels per joint and four neighbours per
+state, under the control gains of 2014; with --table also agents of torso and arms at the table.  Live: all services run in lockstep, with
+PyBullet; for comparison also with MuJoCo and with the motor model alone.  Offline: the same agents learn on the offline plant with five
+other seeds.  The run of each offline seed is compared with the other four; a perfect copy of the plant would have such a distance too, by
+chance.  Therefore a live robot is also compared with four offline seeds at a time.  It counts as equal if its distance is at most 0.01, or
+at most the upper bound for one more offline seed (whose distance would be below this bound with a probability of 95 %).  If the bound is
+more than 0.02 (the margin of equivalence) above the mean distance of the offline seeds, these differ too much for a verdict.  One live run
+can show that the models differ, but not that they are equivalent: then the claim stays open.  Both engines simulate masses, contacts of
+solids and hard stops; the offline plant simulates motors and repulsive fields.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ TRANSITIONS, MIN_TRIES = 800, 2  # per part; of a state-action that is compared
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options of a sweep, and --transitions, --least, --table and --only-table."""
+    """Add the options of a sweep, and --transitions (number per part), --least (tries of a compared action), --table and --only-table."""
     sweep_arguments(parser, seeds=5)
     parser.add_argument("--transitions", type=positive_whole, default=TRANSITIONS, metavar="N", help=f"per part (default: {TRANSITIONS})")
     text = f"tries from which a state-action is compared (default: {MIN_TRIES})"
@@ -82,11 +83,11 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 def results(folder: Path) -> dict[str, Any]:
     """Compute the results from the transitions in the folder as a dict with the keys "claims" and "distances".
 
-    "claims" is a list with the judged claim, as a dict (`Claim.record`).  "distances" is a dict from "task, robot" to a row: "total
-    variation" and "share with the same most frequent outcome", which compare the learned transition models with those of the offline plant,
-    and the number of "state-actions compared".  With runs at the table there is "at the table", too: a dict from "robot, part" to the
-    numbers of the part's actions there: all, those that missed their goals, those that ended in contact with the table, and those that did
-    both.
+    "claims" is a list with the judged claim, as a dict (`Claim.record`).  "distances" is a dict from "task, robot", or "task, offline
+    seeds, smallest" (also median, largest), to a row: "total variation" and "share with the same most frequent outcome", which compare the
+    learned transition models with those of the (other) offline runs, and the number of "state-actions compared".  With runs at the table
+    there is "at the table", too: a dict from "robot, part" to the numbers of the part's actions there: all, those that missed their goals,
+    those that ended in contact with the table, and those that did both.
     """
     tasks = _compared(folder)
     table = {f"{task}, {robot}": row for task, found in tasks.items() for robot, row in _rows(found).items()}
@@ -94,9 +95,9 @@ def results(folder: Path) -> dict[str, Any]:
 
 
 def figure(folder: Path) -> Path:
-    """Draw how far each live robot and each offline seed is from other offline seeds, and how often actions reach their goals.
+    """Draw the distances of the live robots and the offline runs from the (other) offline runs, and how often actions reach their goals.
 
-    How far: the distance of the learned outcomes, as in `results`.  Returns the path of the picture in the folder.
+    A distance compares learned transition models, as in `results`.  Returns the path of the picture in the folder.
     """
     return saved(draw_distances(_compared(folder), _least(folder)), folder, 130)
 

@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Let three independent agents, of torso and arms, explore near a table that an arm reaches only when the torso bends forward.
 
-Claim: over time the agents bend forward, put the arms low and touch the table more and more often, in cycles.  They try most often the
-actions whose outcomes depend on another part; both arms prefer the same actions.  Such an action ends in a handful of states.
+Claim: over time the agents bend the torso forward, lower the arms and touch the table more and more often, in cycles.  They try most
+often the actions whose outcomes depend on another part; both arms try the same actions most often.  Such an action ends in a handful of
+states.
 Source: paper 3.2 and 4.4, figs. 8 to 10; thesis 6.4, 7.4, figs. 7.10 to 7.12; one run of 18 000 transitions a learner in "a little more
 than two full days".  Run time: 9 minutes on 2 cores; with --part more than twice as long.
 
-Torso (27 states, 8 neighbours) and arms (81 states, 16 neighbours, both the same graph) at a table 50 cm thick.  Counts of tries alone say
-little, because on a graph of 16 neighbours some actions are tried more often than others even without a table, and all runs share one
-graph.  So each explorer also runs with a ghost of the table, which exerts no force, and tries are compared with those at the ghost.  An
-action of an arm touches the table if a field of the arm is within 2 cm of the table, or of the ghost, when it ends.
+Torso (27 states, 8 neighbours) and arms (81 states, 16 neighbours, both the same graph) learn at a table 50 cm thick.  Counts of tries
+alone prove little, because on a graph of 16 neighbours some actions are tried more often than others even without a table, and all runs
+share one graph.  So each explorer also runs with a ghost of the table, which exerts no force, and tries are compared with those at the
+ghost.  An action of an arm touches the table if a field of the arm is within 2 cm of the table, or of the ghost, when it ends.
 --part: a contact force acts only on the motors of the part that touches, as in the original program; so a contact of an arm with the table
 exerts no force on the torso.
 """
@@ -113,10 +114,11 @@ def findings(found: Cells) -> dict[str, Any]:
 
     Each table is a dict.  "conditions": a row for each explorer at the table and at its ghost, which exerts no force: "seeds", and the
     means over the runs of the numbers that ROW defines.  "tries at the table over those at the ghost": for each explorer, how this ratio of
-    the left arm's actions correlates with that of the right arm's, and how many of the actions with the largest ratios have a low goal.
-    "number of actions by number of outcomes": for each condition the number of actions of a run, by the number of states in which they
-    ended.  "precision of finding actions that depend on other parts": the result of `detector`.  If not every explorer was run in full at
-    table and ghost, all claims stay unmeasured and are not judged.
+    the left arm's actions correlates with that of the right arm's, and the share of the actions with the largest ratios that have a low
+    goal (a state in which the arm is below the table's top if the torso is bent forward).  "number of actions by number of outcomes": for
+    each condition the number of actions of a run, by the number of states in which they ended.  "precision of finding actions that depend
+    on other parts": the result of `detector`.  If not every explorer was run in full at table and ghost, all claims stay unmeasured and are
+    not judged.
     """
     forces = runs_of(found)
     tree = forces.get(PROPAGATIONS[0], {})
@@ -176,11 +178,12 @@ def _histogram(runs: Sequence[Run]) -> dict[str, float]:
 
 
 def detector(runs: Runs) -> dict[str, dict[str, float]]:
-    """Return how well a high number of tries indicates that an action depends on poses of other parts, by "learner, explorer".
+    """Return how well a high number of tries indicates that an action depends on poses of other parts.
 
-    A detector names the actions with the highest scores, as many as really depend on other parts, so that its precision and recall are
-    equal.  Each value is a dict: "tries", the precision if the score is the number of tries at the table; "beside_ghost", the precision if
-    the score compares this number with that at the table's ghost (`log_ratios`); "chance", the precision of a random choice.
+    If k actions really depend on other parts, the detector names the k actions with the highest scores; its precision is then equal to its
+    recall.  The keys are "learner, explorer".  Each value is a dict: "tries", the precision if the score is the number of tries at the
+    table; "beside_ghost", the precision if the score compares this number with that at the table's ghost (`log_ratios`); "chance", the
+    precision of a random choice.
     """
     table: dict[str, dict[str, float]] = {}
     for learner, explorer in product(LEARNERS, EXPLORERS):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compare the 'Kail' curiosity with the explorers of the literature, in worlds of tables from the literature.
+"""Compare the curiosity of the thesis (information gain 'Kail') with explorers of the literature, in tabular worlds of the literature.
 
 Claim: none is tested.  The question is how soon each explorer has tried every action, and how much reward it finds, if the outcomes are not
 known in advance.

@@ -8,14 +8,14 @@ Source: thesis 5.3, 8.2, 9.3.  Published: no numbers.  Run time: three minutes o
 Robots: the right arm of 2014 under the published control law, and today's right arm under the default law.  There are 27 targets that the
 palm can touch, 19 of the thesis and 8 drawn between them.  Each case begins in a random pose, which is neither home nor a lattice state.
 
-Methods.  "planner": the MDP plans to the state whose sample has the palm nearest to the target, and stops there.  "reach": a force pulls
-the palm to the target from the first pose.  "both": a learner with 3000 curious transitions and 800 tries without obstacles plans to the
-state with the highest expected reward of a reach, and reaches from there; it learns nothing from these cases.  Both planners ("planner" and
-"both") use the learned outcomes of transitions, know which transitions a target blocks, as was learned, and remember within a case which
-transitions failed.  Under the default law up to three reaches are made per case until one does not miss: "both" first plans to another
-state, "reach" repeats in place.
+Methods.  "planner": the MDP plans to the state in which the palm is nearest to the target, and stops there.  "reach": a force pulls the
+palm to the target from the first pose.  "both": a learner that has made 3000 transitions as a curious agent, and 800 tries to reach without
+obstacles, plans to the state with the highest expected reward of a reach, and reaches from there; it learns nothing from these cases.  Both
+planners ("planner" and "both") use the learned outcomes of transitions, know which transitions a target blocks, as was learned, and
+remember within a case which transitions failed.  Under the default law up to three reaches are made per case until one does not miss:
+"both" first plans to another state, "reach" repeats in place.
 
-Scenes: free space; the hand behind the target, as seen from the shoulder; the arm within 3 cm of the object, with the palm turned away; a
+Scenes: free space; the hand behind the target, as seen from the shoulder; the arm within 3 cm of the target, with the palm turned away; a
 ball of 8 cm between hand and target, which only MoBeE's model contains; a target that moves 5 to 12 cm at 3 cm/s.
 
 Under the default law the measure is success: the palm within 2 cm of the target's surface when the force ends.  Under the published law,

@@ -9,9 +9,9 @@ The left arm of the published robot moves among four balls.  Each of 60 queries 
 rank 3 lattice, and lasts at most 120 s.  Half of the queries are hard: a straight motion does not reach the goal.  The model that the
 roadmaps use lacks the constraints of the shoulder's cables ("no cables"), or its balls are wrong by 1 cm and its joints by 3 degrees
 ("miscalibrated"), or both; "gross" lacks the cables and has three times these errors.  The MDP has no such model: it learns by curiosity
-before the queries, or from the queries alone.  A roadmap is planned once, or repaired after a failed motion for the present query
-("repairs") or for all later queries too ("remembers").  A roadmap does not work well if it succeeds in less than 95 % of the hard queries
-and less often than the MDP.  The seeds draw balls, noise and queries; all runs share the lattice's graph.
+before the queries, or from the queries alone.  A path through a roadmap is planned once, or again after each failed motion, which is
+removed for the present query ("repairs") or for all later queries too ("remembers").  A roadmap does not work well if it succeeds in less
+than 95 % of the hard queries and less often than the MDP.  The seeds draw balls, noise and queries; all runs share the lattice's graph.
 """
 
 from __future__ import annotations
@@ -98,11 +98,11 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Let the planners of one kind (straight, MDP or roadmaps) answer all queries.
 
-    Returns `hard` (Q,), whether a straight motion had failed in the query; and arrays with keys "planner|measure".  The measures are
-    "success", "seconds" (plant time), "actions" and "repairs", each (Q,), and "cost", a number: for the MDP the hours of plant time before
-    the first query, for roadmaps the thousands of poses that were checked before it.  `settings`: "queries", their number; for the MDP also
-    "learned", the number of transitions; for roadmaps "belief", the kind of errors in their model, as in `believed`.  `seed`: of scene and
-    planners.
+    Returns `hard` (Q,), whether a straight motion had failed in each of the Q queries; and arrays with keys "planner|measure".  The
+    measures are "success", "seconds" (time of the simulated robot), "actions" and "repairs" (actions that did not end as planned), each
+    (Q,), and "cost", a number: for the MDP the hours of plant time before the first query, for roadmaps the thousands of poses that were
+    checked before it.  `settings`: "queries", their number; for the MDP also "learned", the number of transitions; for roadmaps "belief",
+    the kind of errors in their model, as in `believed`.  `seed`: of scene and planners.
     """
     scene, lattice = make_scene(seed, settings["queries"]), space()
     values: dict[str, Any] = {"hard": scene.is_hard}
@@ -158,7 +158,7 @@ def space() -> Lattice:
 
 
 def world_of(balls: Array) -> World:
-    """Return a world with a ball of 3 cm radius at each of these positions (B, 3) m."""
+    """Return a world with a ball of 3 cm radius at each of these positions (B, 3) m, root frame."""
     world = World()
     for number, position in enumerate(balls):
         world.add(f"ball {number}", sphere(RADIUS), position=position)

@@ -70,7 +70,7 @@ GOLD, GREEN = (0.96, 0.62, 0.0), (0.25, 0.65, 0.3)  # RGB
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options --law, the control law, and --scales, the units of distances in the equations."""
+    """Add the options --law, the control law, and --scales, the units of the distance on which a reward depends (thesis eq. 8.4)."""
     parser.add_argument("--law", choices=list(laws()), default="published", help="the control law of the arm (default: published)")
     parser.add_argument(
         "--scales",
@@ -118,9 +118,9 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 def summary(values: dict[str, Any]) -> dict[str, Any]:
     """Reduce the values of `trial` to those from which the claims and the figure are computed.
 
-    Rewards of an evaluation are added up over the targets, (L, R, 1), for L evaluations of R repetitions.  Problem-tries between two
-    checkpoints are sorted by target and state, because later only their counts are used.  Durations become the total `hours`, actions their
-    mean.
+    Rewards of an evaluation are added up over the targets, (L, R, 1), for L evaluations of R repetitions.  Problem-tries (attempts to reach
+    one target) between two checkpoints are sorted by target and state, because later only their counts are used.  Durations become the
+    total `hours`, actions their mean.
     """
     state, problem = values["reach_state"].astype(np.int8), values["problem"].astype(np.uint8)
     between = np.searchsorted(CHECKPOINTS, np.arange(len(state)), side="right")

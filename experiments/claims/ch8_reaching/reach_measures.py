@@ -37,7 +37,10 @@ class Runs:
         return len(self.values)
 
     def scores(self, checkpoint: int) -> Array:
-        """Return the score of each run at a checkpoint, (N,): sum of the rewards of all targets, mean of the evaluations (fig. 8.2)."""
+        """Return the score of each run, (N,): the sum of the rewards of all targets, averaged over the evaluations (fig. 8.2).
+
+        `checkpoint`: number of problem-tries (attempts to reach one target) before the evaluations, one of `checkpoints`.
+        """
         at = self.checkpoints.index(checkpoint)
         return np.array([one["rewards_grid"][at].sum(axis=-1).mean() for one in self.values])
 
@@ -97,7 +100,7 @@ class Runs:
     def concentration(self, first: int, last: int) -> Array:
         """Return the share of reaches that started in the two most frequent states, (N,).
 
-        Counted are the problem-tries (attempts to reach one target) from number `first` (counted from 0) up to, but without, `last`.
+        Only the problem-tries (attempts to reach one target) from number `first` to number `last` - 1 are counted; numbers begin with 0.
         """
         sums = [np.sort(_tried(one, slice(first, last)).sum(axis=0))[::-1] for one in self.values]
         return np.array([one[:2].sum() / one.sum() for one in sums])
@@ -134,7 +137,7 @@ Units = Mapping[str, ByStrategy]  # by unit of distances, as "1 cm"
 
 
 def runs_of(found: Cells) -> Units:
-    """Group the finished runs by unit of distances, as "1 cm", and then by strategy; each group is sorted by seed."""
+    """Group the finished runs by the unit of distances in the equations, as "1 cm", and then by strategy; each group is sorted by seed."""
 
     def of(result: CellResult) -> tuple[Mapping[str, Any], float, tuple[int, ...]]:
         return result.values, result.seconds, tuple(result.cell.settings["checkpoints"])

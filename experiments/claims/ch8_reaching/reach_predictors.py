@@ -10,9 +10,10 @@ Run time: 20 minutes on 2 cores.
 The arm, the targets and the evaluations are those of the experiment reach-exploration.  All learners have the same seeds, problems and
 transition models.
 The oracle plans as the learners do, but knows the mean reward of every reach and which transitions a target blocks.  Both are measured on
-the plant by 5 tries of each reach and transition (truth.npz in the run's folder).  Scores are divided by the oracle's mean score over all
-seeds, so that a fraction can exceed 1 by chance.  The targets that are never tried lie in the middles of the eight cells of the grid of 27
-targets.  "spread", "local" and "alike" in a learner's name say how it remembers failed transitions (mobee/learning/reaching/failures.py).
+the plant by 5 tries of each reach and transition (truth.npz in the run's folder).  A score is the sum of the rewards of all targets of a
+set in one evaluation.  Scores are divided by the oracle's mean score over all seeds, so that a fraction can exceed 1 by chance.  The
+targets that are never tried lie in the middles of the eight cells of the grid of 27 targets.  "spread", "local" and "alike" in a learner's
+name denote how it remembers failed transitions (mobee/learning/reaching/failures.py).
 """
 
 from __future__ import annotations
@@ -57,7 +58,7 @@ Fractions = dict[tuple[str, str], Array]  # learner and set -> (seeds, checkpoin
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options of a sweep, and --law (control law), --scale (unit of distances, m) and --only (which learners run)."""
+    """Add --seeds, --jobs, --engine, --quick, --law (control law), --scale (unit of distances, m) and --only (which learners run)."""
     sweep_arguments(parser)
     parser.add_argument("--law", choices=list(laws()), default="published", help="the control law of the arm (default: published)")
     parser.add_argument(
@@ -117,8 +118,9 @@ def trial(truth: Truth, cell: Cell) -> dict[str, Any]:
     """Run one learner, or the oracle with the measured `truth`, and evaluate it on both sets of targets.
 
     The oracle is an agent that knows the true rewards and the blocked transitions.  The sets are "grid", targets that are tried, and
-    "between", targets that never are.  Returns, for L evaluations of R repetitions of P targets, `rewards_SET` and `states_SET` (L, R, P)
-    and `blocked_SET` (L,), failed transitions; for a learner also the arrays of its tries, as in `experiments.kit.reaching.learning.learn`.
+    "between", targets that never are.  Returns, for L evaluations of R repetitions of P targets: `rewards_SET` (L, R, P), the rewards of
+    the reaches; `states_SET` (L, R, P), the states from which they were made; `blocked_SET` (L,), the numbers of failed transitions; for a
+    learner also the arrays of its tries, as in `experiments.kit.reaching.learning.learn`.
     """
     settings, space = cell.settings, reach_space()
     plant, aim = reach_plant(cell.seed, settings["law"]), laws()[settings["law"]].aim
@@ -147,9 +149,10 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 def summary(values: dict[str, Any]) -> dict[str, Any]:
-    """Reduce the values of a cell for the raw record: only rewards are kept, added up over the targets of an evaluation.
+    """Reduce the values of a cell (a single run) for the raw record: only rewards are kept, added up over the targets of an evaluation.
 
-    The sums are (L, R, 1), for L evaluations of R repetitions.  The values of a cell that measures the truth are not changed.
+    The raw record is an archive of the run's files in the repository.  The sums are (L, R, 1), for L evaluations of R repetitions.  The
+    values of a cell that measures the truth are not changed.
     """
     rewards = {name: value for name, value in values.items() if name.startswith("rewards_")}
     return {name: value.sum(axis=-1, keepdims=True) for name, value in rewards.items()} or values
@@ -169,7 +172,8 @@ def oracle_scores(found: Found, name: str) -> Array:
 def fractions(found: Found) -> Fractions:
     """Return a dict from (learner, set of targets) to the scores divided by the oracle's mean score, (seeds, checkpoints).
 
-    The sets are "grid" and "between".  The dict is empty without finished cells of the oracle.
+    A checkpoint is a number of problem-tries after which the learners were evaluated (`evaluated_after`).  The sets are "grid" and
+    "between".  The dict is empty without finished cells of the oracle.
     """
     curves: Fractions = {}
     for name in (GRID, BETWEEN):

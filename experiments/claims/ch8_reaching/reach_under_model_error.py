@@ -6,17 +6,18 @@ target just a little may invalidate the plan).
 Source: thesis 5.3, 9.3; our own aims: equal success after 200 tries, 20 percentage points more after 800.  Published: no numbers.
 Run time: ten minutes on 2 cores, for 10 seeds.
 
-The right arm of today's robot, under the default law, has 27 targets that it can touch without a force of a joint limit: 12 of the thesis,
-and others drawn between them.  Targets that cannot be touched because of the ball are left out.  The planners' model lacks the constraints
-of the shoulder's cables, and a ball with a diameter of 10 cm in the workspace, which only blocks motions; its target positions are wrong by
-1 cm and its joints by 3 degrees.  There are three kinds of runs.  "planners": only the planners' model is wrong.  "everyone": MoBeE's model
-has the same errors of targets and joints, so that the learner's reaches miss as the planners' motions do, and only the outcome shows it.
-"nothing": all models are right, for comparison.
+The robot is today's robot file "icub" under the default control law (not those of 2014).  The right arm has 27 targets that it can touch
+without a force of a joint limit: 12 of the thesis, and others drawn between them.  Targets that cannot be touched because of the ball are
+left out.  The planners' model lacks the constraints of the shoulder's cables, and a ball with a diameter of 10 cm in the workspace, which
+only blocks motions; its target positions are wrong by 1 cm and its joints by 3 degrees.  There are three kinds of runs.  "planners": only
+the planners' model is wrong.  "everyone": MoBeE's model has the same errors of targets and joints, so that the learner's reaches miss as
+the planners' motions do, and only the outcome shows it.  "nothing": all models are right, for comparison.
 
 The learner has learned the outcomes of transitions in 3000 curious transitions without target and ball.  Learner and planner make the same
 number of tries; each try is for the target with the fewest tries so far, from the arm's present pose.  The planner uses inverse kinematics
-and RRT-Connect (OMPL) with the compiled validity test; it has 20 actions per try, the learner 10.  It remembers nothing ("none"), or where
-motions were blocked ("blocked"), or also which poses missed the target ("missed").  A try fails when its actions are used up.
+and RRT-Connect (OMPL), and checks poses for contacts in its own model; it has 20 actions per try, the learner 10.  It remembers nothing
+("none"), or where motions were blocked ("blocked"), or also which poses missed the target ("missed").  A try fails when its actions are
+used up.
 The seeds draw ball, errors, noise and first poses.  Seed 0 was used while scene and planner were developed; therefore the reported runs
 begin with --seed 1.
 """
@@ -95,7 +96,7 @@ TITLES = {
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return the settings of the runs: learner and planners with each kind of wrong model, "planners", "everyone" and "nothing".
+    """Return the settings of the runs: learner and planners, if the planners' models are wrong, or everyone's, or nobody's ("nothing").
 
     With "nothing" only the planner without memory is run.  With --quick there are at most 100 tries.
     """
@@ -244,7 +245,10 @@ class Contestant(Protocol):
         """Make `tries` more tries, each for the target with the fewest tries so far (thesis 8.3.2), and learn from them."""
 
     def evaluate(self, repetitions: int) -> Score:
-        """Try all targets in random order `repetitions` times, each time from a random state (thesis 8.3.3), without learning."""
+        """Try all targets `repetitions` times, each time in random order, without learning (thesis 8.3.3).
+
+        A repetition begins in a random state; each further try in it begins where the last one ended.
+        """
 
     @property
     def hours(self) -> float:

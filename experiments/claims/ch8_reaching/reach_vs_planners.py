@@ -1,25 +1,26 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compare the learned reacher with a planner (inverse kinematics and RRT-Connect) that knows the robot and the world.
+"""Compare an agent that has learned to reach with a planner (inverse kinematics and RRT-Connect) that knows the robot and the world.
 
 Claim: the learned reacher is no worse than planning with a perfect model, also under encoder noise and for a moving target.  Single-query
 planning is too slow to be used online: it takes 10 s for a path of both arms around a table's edge to a cup, and 125 s to smooth this path.
 Source: thesis 1.5, 9.3.  Published: BT-RRT's 10 s and 125 s (Perez et al. 2011).  Run time: three minutes on 2 cores.
 
-One arm: the right arm of today's robot under the default law.  Targets (which the arm can touch without a force of a joint limit), first
-poses and seeds are the same for learner and planner.  The learner has made 3000 curious transitions and 800 tries before, and learns
-nothing here.  The planner (experiments/kit/reaching/planner_peer.py) knows the robot, its cables and the target's position, and plans again
-after every change; MoBeE executes its motions.  "noise": encoder noise of 0.5 degrees, five times the usual; "moving": the target moves
-back and forth by 5 to 12 cm at 3 cm/s without a stop.  Success: the palm is within 2 cm of the target's surface; the learner may reach
-three times, the planner has 20 actions.  Plant time stands still during planning, which is measured in processor time.
+One arm: the right arm of the robot file "icub" (not that of 2014) under the default control law.  Targets, first poses and seeds are the
+same for learner and planner; the palm can touch each target in a pose in which no joint limit exerts a force.  The learner has made 3000
+curious transitions (actions for information gain, without a target) and 800 tries before, and learns nothing here.  The planner
+(experiments/kit/reaching/planner_peer.py) knows the robot, its cables and the target's position, and plans again after every change; MoBeE
+executes its motions.  "noise": encoder noise of 0.5 degrees, five times the usual; "moving": the target moves back and forth by 5 to 12 cm
+at 3 cm/s without a stop.  Success: the palm is within 2 cm of the target's surface; the learner may reach three times, the planner has 20
+actions.  Plant time stands still during planning, which is measured in processor time.
 
 A moving target has another position after every motion of the planner, so that all paths except straight ones are planned again at each
 corner.  The last motion takes a second or more, and goes to the position that the target had when this motion began.  The learner's reach
 follows the target.  Neither of them predicts the target's motion.
 
-Two arms (twelve joints, thesis 1.5): no drawing of this problem was published.  Here both hands begin beside the table, below its top or
-just above it, and end on both sides of a cup; poses are drawn anew for each query.  So the comparison of times shows orders of magnitude
-only; it also compares today's processor with that of 2011.  Seed 0 was used while the planner was developed; therefore the reported runs
-begin with --seed 1.
+Two arms (twelve joints, thesis 1.5): no figure that shows this problem was published.  Here both hands begin beside the table, below its
+top or just above it, and end on both sides of a cup; poses are drawn anew for each query.  So the comparison of times shows orders of
+magnitude only; it also compares today's processor with that of 2011.  Seed 0 was used while the planner was developed; therefore the
+reported runs begin with --seed 1.
 """
 
 from __future__ import annotations

@@ -6,13 +6,13 @@ well in practice".  But in a dense map "finding a path around a novel obstacle t
 many, many edges".  Source: thesis 4.3.3, 4.4, figs. 4.8, 4.9.  Published: 5000 vertices, k = 8; no numbers of bumps.
 Run time: 5 minutes on 2 cores.
 
-The roadmap is that of figure 4.8: torso and right arm, palm down 6 cm over the table, 8 nearest neighbours, no edge checked, built by least
-squares, with spacings from 4 cm to 8 mm, which give 170 to 4400 vertices.  A query goes from one vertex to another.  The robot sees
-nothing.  A cup, 10 cm high and 6 cm wide, stands beside the shortest path, where another path remains.  The robot follows the edges of its
-path.  A bump occurs on the first edge on which solids would touch, checked every millimetre; then the robot moves back to the beginning of
-that edge and plans again.  There are two modes.  "edge": the edge is removed (thesis 4.2).  "around" (ours): all edges with an end within 3
-cm of the end of that edge are removed as well, as long as a path remains.  In the first query of each run, the offline plant under the
-default law follows a path around the cup.
+The roadmap is that of figure 4.8.  Its vertices are poses of torso and right arm with the palm down, 6 cm over the table, found by least
+squares.  Each has edges to its 8 nearest neighbours, which are not checked for contacts.  Spacings from 4 cm to 8 mm give 170 to 4400
+vertices.  A query goes from one vertex to another.  The robot sees nothing.  A cup, 10 cm high and 6 cm wide, stands beside the shortest
+path, where another path remains.  The robot follows the edges of its path.  A bump occurs on the first edge on which solids would touch,
+checked every millimetre; then the robot moves back to the beginning of that edge and plans again.  There are two modes.  "edge": the edge
+is removed (thesis 4.2).  "around" (ours): all edges with an end within 3 cm of the far end of that edge are removed as well, as long as a
+path remains.  In the first query of each run, the offline plant under the default law follows a path around the cup.
 """
 
 from __future__ import annotations
@@ -74,11 +74,11 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Put a cup beside the path of each query, and plan around it after bumps, once with each mode of removing edges.
 
-    Returns the numbers of `vertices` and `edges` of the roadmap; `invalid` (queries,), the number of edges that the cup blocks; and arrays
-    (queries,) with keys "mode|measure".  The modes are "edge" and "around", as in `walked`; the measures "arrived", "bumps", "edges" and
-    "seconds", as in `Walk`.  The plant executes the path around the cup in the first query: `off` is the distance of the palm from its
-    planned position at the end, `solid` the depth of the deepest contact of solids, both in m; NaN if there is no such path.  `settings`:
-    "spacing", distance of the roadmap's vertices [m]; "queries", their number.  `seed`: of the queries.
+    Returns the numbers of `vertices` and `edges` of the roadmap; `invalid` (queries,), the number of edges on which solids would touch in
+    the world with the cup; and arrays (queries,) with keys "mode|measure".  The modes are "edge" and "around", as in `walked`; the measures
+    "arrived", "bumps", "edges" and "seconds", as in `Walk`.  The plant executes the path around the cup in the first query: `off` is the
+    distance of the palm from its planned position at the end, `solid` the depth of the deepest contact of solids, both in m; NaN if there
+    is no such path.  `settings`: "spacing", distance of the roadmap's vertices [m]; "queries", their number.  `seed`: of the queries.
     """
     roadmap = built(settings["spacing"])
     found: dict[str, Any] = {"vertices": len(roadmap.q), "edges": len(roadmap.edges)}
@@ -123,7 +123,10 @@ class Walk:
 
 @lru_cache(maxsize=2)
 def built(spacing: float) -> Roadmap:
-    """Build the pre-grasp roadmap with a spacing [m]; each pose is joined to its 8 nearest, and no edge is checked for contacts."""
+    """Build the pre-grasp roadmap; each pose is joined to its 8 nearest, and no edge is checked for contacts.
+
+    `spacing`: distance of the palm between neighbouring poses [m].
+    """
     return build(replace(example(), spacing=spacing), "least_squares", neighbours=NEIGHBOURS)
 
 
@@ -153,9 +156,9 @@ def draw_query(rng: np.random.Generator, roadmap: Roadmap) -> Query:
 def walked(roadmap: Roadmap, query: Query, mode: str) -> Walk:
     """Follow the shortest path of the remaining edges; after a bump move back to the beginning of the edge, and plan again.
 
-    `mode` "edge": a bump removes its edge (thesis 4.2).  "around": it also removes all edges with an end within 3 cm of the end of that
-    edge, but not those that the robot has already followed without a bump.  If this leaves no path, the path may use all edges without a
-    bump.
+    `mode` "edge": a bump removes its edge (thesis 4.2).  "around": it also removes all edges with an end within 3 cm (distance of the palm)
+    of the far end of that edge, but not those that the robot has already followed without a bump.  If this leaves no path, the path may use
+    all edges on which no bump occurred.
     """
     removed: set[Edge] = set()
     bumped: set[Edge] = set()
@@ -215,9 +218,9 @@ def findings(found: Cells) -> dict[str, Any]:
     """Return the results as a dict with three keys, "roadmaps", "executed" and "claims".
 
     "roadmaps" is a list with a row for each spacing and mode of removing edges: numbers of vertices, blocked edges and runs, and the
-    measures in ROW.  "executed" is a dict with the number of executed "paths", their solid contacts, and the error of the palm at the end
-    [cm].  "claims" is a list with the claims, their measured values and their verdicts, as dicts (`Claim.record`).  With runs of one
-    spacing only, all claims stay unmeasured and are not judged.
+    measures (share of successful queries, bumps, edges begun, robot time).  "executed" is a dict with the number of executed "paths", their
+    solid contacts, and the error of the palm at the end [cm].  "claims" is a list with the claims, their measured values and their
+    verdicts, as dicts (`Claim.record`).  With runs of one spacing only, all claims stay unmeasured and are not judged.
     """
     groups = grouped(found, "spacing", SPACINGS)
     rows = [
@@ -233,8 +236,8 @@ def findings(found: Cells) -> dict[str, Any]:
 def numbers(runs: list[dict[str, Any]], mode: str, name: str) -> Array:
     """Return the mean of a measure over the queries of each run, (runs,).
 
-    `mode`: "edge" (a bump removes its edge) or "around" (it also removes the edges near its place).  `name`: "arrived", whether the goal
-    was reached; "bumps", number of bumps; "edges", number of edges begun; or "seconds", duration of the motion.
+    `mode`: "edge" (after a bump, a contact on an edge, this edge is removed) or "around" (the edges near it are removed too).  `name`:
+    "arrived", whether the goal was reached; "bumps", number of bumps; "edges", number of edges begun; or "seconds", duration of the motion.
     """
     return np.array([float(np.mean(values[f"{mode}|{name}"])) for values in runs])
 

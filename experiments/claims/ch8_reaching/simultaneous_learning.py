@@ -2,17 +2,17 @@
 """Compare learning transitions and reaches at the same time with learning the transitions first.
 
 Claim: there is no reason that the transition model and the reaches cannot be learned simultaneously; where an action fails, contact with a
-workspace object decides whether the failure is a negative reward of the problem or an update of the model.
+workspace object decides whether the failure is a negative reward of the problem (to reach a target) or an update of the model.
 Source: thesis 9.4.1 (future work).  Published: no numbers.  Run time: five minutes on 2 cores.
 
-The right arm under the published law and the 27 targets are those of reach-exploration; the learner is one of reach-predictors (--learner).
-There are five variants.  All have the same total number of actions, which includes reaches but not the actions of evaluations.
-"contact": transitions and reaches are learned at the same time, and failures are attributed by contact.  "first-3000": first 3000 curious
-transitions without targets, as in the thesis; then reaches, during which the model does not change.  "first-1000": the same with 1000
-transitions.  "model": at the same time, but every transition updates the model, as if there were no contact sensors.  "target": at the same
-time, but every transition that does not end in its goal is attributed to the target, so that only successes update the model.
-A score is the sum of the rewards of the 27 targets in one evaluation.  The error of a model is the mean L1 distance, 0 to 2, between its
-outcome probabilities (without the imagined outcomes of the prior) and the outcomes of random walks without targets.
+The right arm under the published control law and the 27 targets are those of the experiment reach-exploration; the learner is one of those
+of reach-predictors (--learner).  There are five variants.  All have the same total number of actions, which includes reaches but not the
+actions of evaluations.  "contact": transitions and reaches are learned at the same time, and failures are attributed by contact.
+"first-3000": first 3000 curious transitions without targets, as in the thesis; then reaches, during which the model does not change.
+"first-1000": the same with 1000 transitions.  "model": as "contact", but every transition updates the model, as if there were no contact
+sensors.  "target": as "contact", but every transition that does not end in its goal is attributed to the target, so that only successes
+update the model.  A score is the sum of the rewards of the 27 targets in one evaluation.  The error of a model is the mean L1 distance, 0
+to 2, between its outcome probabilities (without the imagined outcomes of the prior) and the outcomes of random walks without targets.
 """
 
 from __future__ import annotations
@@ -80,8 +80,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
     """Return the settings of the runs: walks through the states, which measure the true outcomes of actions, and five variants.
 
-    Transitions and reaches are learned at the same time, and failures are attributed by contact, always to the model, or always to the
-    target; or 3000 or 1000 transitions are learned first.  With --quick the runs have 2000 instead of 4000 actions.
+    The variants "contact", "model" and "target" learn transitions and reaches at the same time, and attribute failures by contact, always
+    to the model, or always to the target.  "first-3000" and "first-1000" learn 3000 or 1000 transitions first.  With --quick the runs have
+    2000 instead of 4000 actions.
     """
     checkpoints = list(QUICK if arguments.quick else CHECKPOINTS)
     variants = [Condition(variant, {"variant": variant, "learner": arguments.learner, "checkpoints": checkpoints}) for variant in VARIANTS]
@@ -93,8 +94,9 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
     A walk returns its transitions `seen` (T, 3).  A learner returns, for L evaluations that try each target R times, `scores` (L, R), NaN
     before the first target; `tries` and `failed` (L,), numbers of problem-tries (attempts to reach one target) and failed transitions so
-    far; and for each evaluation n its transition model, `outcomes_n` and `probabilities_n` (S, A, B).  `settings`: "variant", "walk" or one
-    of VARIANTS; "learner", one of LEARNERS; "checkpoints", the L numbers of actions before the evaluations.  `seed`: of agent and plant.
+    far; and for each evaluation n its transition model, `outcomes_n` and `probabilities_n` (S, A, B) for up to B outcomes of an action.
+    `settings`: "variant", "walk" or one of VARIANTS; "learner", one of LEARNERS; "checkpoints", the L numbers of actions before the
+    evaluations.  `seed`: of agent and plant.
     """
     if settings["variant"] == WALK:
         return {"seen": walk(reach_space(), reach_plant, TRIES, MAX_WALK, seed).astype(np.uint16)}
@@ -241,7 +243,7 @@ def actions_to(least: float, actions: Ints, scores: Array) -> Array:
 
 
 def no_more(ours: Array, theirs: Array) -> bool | None:
-    """Return whether the runs of "contact" need at most as many actions as the runs of another variant with the same seeds.
+    """Return whether the runs of the variant "contact" need at most as many actions as those of another variant with the same seeds.
 
     `ours`, `theirs`: numbers of actions until a given score is reached (`actions_to`), for these two groups of runs, (N,).  None if a
     number is inf, because its run never reached the score, or if the interval of the differences contains 0.
@@ -252,7 +254,7 @@ def no_more(ours: Array, theirs: Array) -> bool | None:
 
 
 def level(ours: Array, theirs: Sequence[Array]) -> bool | None:
-    """Return whether the scores of "contact" are at most 5 % below the scores of each other variant.
+    """Return whether the scores of the variant "contact" are at most 5 % below the scores of each other variant.
 
     `ours`: scores (N,) of "contact" with N seeds.  `theirs`: scores (N,) with the same seeds, for each other variant.  The intervals of the
     differences decide: True if all lie above the bound of -5 %, False if one lies completely below it, else None.

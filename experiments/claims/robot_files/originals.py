@@ -2,8 +2,9 @@
 """Originals: whether this library reads the robot and world files of 2010 to 2014 as the programs of that time did.
 
 Claim: at least 95 % of the distinct files in the public histories of kailfrank/MoBeE and Juxi/icVision load as they are.  Positions,
-normals of markers, motor limits, tested pairs of volumes, clauses (constraints on several joints) and contacts are those of the program of
-2014; program_2014.py states its rules again, from its source.  Source: kailfrank/MoBeE (2014), Juxi/icVision (2010 to 2013); thesis 2.3.1.
+normals of markers, motor limits, tested pairs of volumes, clauses (constraints on several joints) and contacts are those that the program
+of 2014 computes.  That program is not run: program_2014.py implements its rules again, after its source code.  Source: kailfrank/MoBeE
+(2014), Juxi/icVision (2010 to 2013); thesis 2.3.1.
 Run time: three minutes with 20 poses a file.
 
 The files are not part of this project.  Fetch the two repositories, and give the folder that holds them:

@@ -3,15 +3,15 @@
 
 Claim: each of 28 robots with 4 to 300 motors stays within 0.5 degrees or 1 mm of its home.  None touches itself at home, if a file that
 `mobee check --write-srdf` has written excludes the pairs of links that touch there.  Each prismatic joint settles within 1 mm of goals from
-5 to 95 % of its range.  To read the robot's file and make 250 curious actions of an arm takes at most 15 s.
+5 to 95 % of its range.  To read the robot's file and let a curious agent make 250 actions of an arm takes at most 15 s.
 Source: aims of this reproduction; the thesis has one robot.  Published number: none.  Run time: 5 minutes.
 
 The robots are those of example-robot-data 6.0.0 and pybullet_data, and four extreme ones: a chain of 200 joints, a star of 300, and an arm
-six orders of magnitude too small and one three too large.  They have default gains, the motors of the offline plant, an empty world and no
-fields (volumes around the links, which exert forces but are not solid).  The drift from home and the curious actions are also measured with
-fields of 3 cm; that drift is printed but not judged, because fields that overlap at home push the robot.  Errors are those of the true
-joint positions; for a prismatic joint the error of its encoder value counts too.  Times are those of this machine.  The figure is a table
-in Markdown.
+six orders of magnitude too small and one three too large.  They have default gains, the motors of the offline plant (a robot simulated in
+one process), an empty world and no fields (volumes around the links, which exert forces but are not solid).  The drift from home and the
+actions of the agent are also measured with fields of 3 cm; that drift is printed but not judged, because fields that overlap at home push
+the robot.  Errors are those of the true joint positions; for a prismatic joint the error of its encoder value counts too.  Times are those
+of this machine.  The figure is a table in Markdown.
 """
 
 from __future__ import annotations

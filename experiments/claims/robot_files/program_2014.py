@@ -2,8 +2,8 @@
 """The rules by which the MoBeE program of 2014 read robot files, written again from its source; no code is shared with mobee.robot.
 
 The module reads files of 2011 to 2014 with the standard library's XML parser, and makes every <link> and <joint> a node of a tree, as the
-program did (kailfrank/MoBeE: zphandler, kintreenode, transformable, linearconstraint).  Positions are in m, angles in degrees, as in a
-file.
+program did (kailfrank/MoBeE: zphandler, kintreenode, transformable, linearconstraint).  Positions are in m; positions of motors and
+limits of joints are in degrees, as in a file.
 """
 
 from __future__ import annotations
@@ -222,8 +222,8 @@ class Program:
 def special_euler(axis: Array, angle: float) -> Array:
     """Return the rotation (3, 3) that gives a volume its height axis, as MoBeE of 2014 computed it.
 
-    First a rotation about y brings x to the projection of `axis` (3,) on the x-z plane; then the shortest rotation brings y to `axis`; the
-    last rotation, by `angle` [rad], is about `axis`.
+    The first rotation is about y, by the angle (0 to 180 degrees) between x and the projection of `axis` (3,) on the x-z plane; then the
+    shortest rotation brings y to `axis`; the last rotation, by `angle` [rad], is about `axis`.
     """
     turn = np.eye(3)
     flat = np.array([axis[0], 0.0, axis[2]])

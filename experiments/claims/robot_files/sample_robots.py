@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The robots that `own_robots` measures: of example-robot-data, of pybullet_data, and some of extreme size."""
+"""The robots of the experiment own-robots: those of example-robot-data and pybullet_data, and generated ones of extreme size."""
 
 from __future__ import annotations
 

@@ -36,10 +36,10 @@ class FileRecord(Row):
     `outcome`: "loads", "thing" (no joint moves, so it is no robot), "refused" or "crash".  `message`: why it was refused, crashed or not
     compared.  `links`: number of links whose frames were compared.  `srdf`: name of the SRDF that was found; `home`: name of the pose in
     it.  `seconds`: time to load, with default options.  `frame_error`: largest difference of an element of a link's frame from Pinocchio's
-    [m or 1].  `contacts`: number of pairs of links that touch by the collision library coal, summed over all poses.  `other`: number of
-    pairs that touch by more than 1e-6 m, but only by coal or only by this library, summed likewise; `deepest_other`: largest depth of a
-    contact that only one of them finds [m].  `at_home`: number of solid contacts at home, with default options; `at_home_without`: the same
-    without an SRDF.
+    [m or 1].  `contacts`: number of contacts between links that the collision library coal finds, summed over all poses.  `other`: number
+    of contacts deeper than 1e-6 m that only coal or only this library finds, summed likewise; `deepest_other`: largest depth of a contact
+    that only one of them finds [m].  `at_home`: number of solid contacts at home, with default options; `at_home_without`: the same without
+    an SRDF.
     """
 
     PLACES = None  # frames differ by 1e-16
@@ -203,12 +203,15 @@ class UrdfPeer:
         return q
 
     def frames(self, angles: Array) -> dict[str, Array]:
-        """Return a dict from the name of every link to its frame (4, 4).  `angles`: positions of the robot's joints (J,), rad or m."""
+        """Return a dict from the name of every link to its pose (4, 4) in the frame of the root link.
+
+        `angles`: positions of the robot's joints (J,), rad or m.
+        """
         self._pin.framesForwardKinematics(self._model, self._data, self._configuration(angles))
         return {name: self._data.oMf[k].homogeneous for name, k in self._frames.items()}
 
     def read_shapes(self, tested: set[LinkPair]) -> None:
-        """Read the collision geometry from the file, with meshes as exact convex hulls; raises PeerFailed.
+        """Read the collision geometry from the file, with meshes as exact convex hulls; raises PeerFailed if it cannot be read.
 
         `tested`: the pairs of links whose shapes are tested.
         """

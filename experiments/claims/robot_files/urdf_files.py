@@ -2,8 +2,9 @@
 """URDF files by other authors: whether they load, and whether frames and contacts agree with Pinocchio and coal.
 
 Claim: a URDF file by others loads as it is, or is refused with a message that names the line and a remedy.  In every pose the frames of all
-links agree with Pinocchio's within 1e-9, and, with exact convex hulls of the meshes, the same pairs of links touch as by the collision
-library coal.  Source: none; our own aim (docs/robots.md).  Run time: about five minutes for 181 files.
+links agree with Pinocchio's within 1e-9 (position in m, and elements of the rotation matrix), and, with exact convex hulls of the meshes,
+the same pairs of links touch as by the collision library coal.  Source: none; our own aim (docs/robots.md).  Run time: about five minutes
+for 181 files.
 
 Without --folders, the files of the packages icub_models, pybullet_data (without random_urdfs), mujoco, robosuite, dm_control and
 example-robot-data are compared, as far as these are installed.  The results of each file are written before the next file is compared, and
@@ -81,8 +82,8 @@ def results(found: Sequence[FileRecord]) -> dict[str, Any]:
     """Return the results of all files.
 
     Keys: "sets", dict from the name of a set of files, or "all", to the dict that `numbers` returns for it.  Three dicts from the name of a
-    file to a text: "refused", why it was refused or crashed; "contacts_that_differ", how many, and the largest depth; "not_compared", why.
-    "passed", whether no file crashes, frames differ by at most 1e-9, and no contact differs.
+    file to a text: "refused", why it was refused or crashed; "contacts_that_differ", how many, and their largest depth [m]; "not_compared",
+    why.  "passed", whether no file crashes, frames differ by at most 1e-9 (m, or element of a rotation matrix), and no contact differs.
     """
     sets = {set_name: [one for one in found if one.name.startswith(f"{set_name}/")] for set_name in dict.fromkeys(map(_set_of, found))}
     table = {set_name: numbers(some) for set_name, some in {**sets, "all": list(found)}.items()}

@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The zoo: whether robots by other authors explore by curiosity with their files as they are, and how deep they touch themselves meanwhile.
+"""The zoo: whether robots of other authors, with unchanged files, explore by curiosity, and the depth of their self-contacts meanwhile.
 
 Claim: every robot of six collections loads as it is.  `mobee.derive` computes its arms with their joints, its home, the pairs that are
-tested for contacts, and the fields.  The robot touches nothing at home.  In ten minutes of curious exploration with the derived gains it
-touches itself no deeper than 2 mm.  A single agent tries every action of the states that it visits.  If a robot fails, its line of the
-table names each failure.
+tested for contacts, and the fields (larger volumes around links, which cause repulsive forces).  The robot touches nothing at home.  In ten
+minutes of curious exploration with the derived gains it touches itself no deeper than 2 mm.  A single agent tries every action of the
+states that it visits.  If a robot fails, its line of the table names each failure.
 Source: aims of this reproduction; the thesis has one robot.  Published number: none.  Run time: 15 seconds for each robot.
 
-The collections are icub_models, pybullet_data, example-robot-data (URDF), robosuite, dm_control and kinova (MJCF); kinova are the robots of
-other makers in the package dm_control.  --folders names the collections; without it, the packages that are installed are searched, and
-kinova is left out.  All derived arms of a robot learn at once on one offline plant for --minutes of robot time; the true positions of its
-motors are compared with its solids every 0.1 s.  Then the agent of the arm that moves its end farthest learns alone for --actions
-transitions.  The results of each robot are written before the next robot is measured, and --resume continues after them.  The figure is a
-table in Markdown.
+The collections are icub_models, pybullet_data, example-robot-data (URDF), robosuite, dm_control and kinova (MJCF).  The collection kinova
+has the robots in the package dm_control that are by other makers.  --folders names the collections; without it, the packages that are
+installed are searched, and kinova is left out.  All derived arms of a robot learn at once on one offline plant for --minutes of robot time;
+the true positions of its motors are compared with its solids every 0.1 s.  Then the agent of one arm learns alone for --actions
+transitions: the arm whose end can be moved farthest by a single motor.  The results of each robot are written before the next robot is
+measured, and --resume continues after them.  The figure is a table in Markdown.
 """
 
 from __future__ import annotations
@@ -177,9 +177,10 @@ def babble(derived: Derived, minutes: float, seed: int) -> tuple[int, float, str
 
 
 def explore(derived: Derived, actions: int, seed: int) -> tuple[CuriousAgent, set[int]]:
-    """Let the arm that moves its end farthest learn alone, and return its agent and the states that it has visited.
+    """Let one arm of a robot learn alone, and return its agent and the states that it has visited.
 
-    It ends after `actions` transitions, or when every action of every visited state was tried.  `seed`: of agent and plant.
+    It is the arm whose end can be moved farthest by a single motor (`movement` of a derived arm).  The run ends after `actions`
+    transitions, or when every action of every visited state was tried.  `seed`: of agent and plant.
     """
     arm = max(derived.arms, key=lambda one: one.movement)
     plant = OfflinePlant(Model(derived.robot), seed, derived.gains, dt=DT, active=[arm.part])
@@ -202,7 +203,7 @@ def read_refused(folder: Path) -> list[dict[str, str]]:
 
 
 def failures(one: Measured) -> list[str]:
-    """Return texts that say what a robot cannot do; [] if it meets the claim."""
+    """Return a text for each failure of a robot: deep contact, contacts at home, untried actions, errors by `mobee check`."""
     judged = {
         f"comes {one.depth_mm:.1f} mm into itself ({one.touching})": one.depth_mm > 1e3 * MAX_DEPTH,
         f"touches itself at home ({one.at_home:.0f} contacts)": one.at_home > 0,
@@ -217,7 +218,7 @@ def results(folder: Path) -> dict[str, Any]:
 
     Main keys: "robots": number of robots that were measured; "within 2 mm": number of robots whose contacts stay so shallow; "tried all
     that can be tried": number of robots whose single agent tried every action of the states that it visited; "meet the claim": number of
-    robots without a failure; "cannot": dict from the name of a robot that does not meet the claim to a text that says what it cannot do;
+    robots without a failure; "cannot": dict from the name of a robot that does not meet the claim to a text with its failures;
     "refused": dict from the name of a file that could not be used to the reason; "no robots": number of files that hold nothing that can
     learn; "passed": whether all robots meet the claim, None if no robot was measured.
     """

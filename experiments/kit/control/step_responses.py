@@ -30,8 +30,8 @@ class StepResponse:
 
     The end position of a joint is its mean position in the last second.  `settling`: time until the joint stays within 5 % of the step
     around its end position, s.  `overshoot`: largest motion beyond the end position, as share of the step.  `error_deg`: distance between
-    end position and attractor, degrees.  `rest_deg`: standard deviation in the last second, degrees.  `is_settled`: whether all joints
-    settled before the last second.
+    end position and attractor (the commanded position), degrees.  `rest_deg`: standard deviation in the last second, degrees.
+    `is_settled`: whether all joints settled before the last second.
     """
 
     settling: float  # s
@@ -77,7 +77,7 @@ def postures(count: int, seed: int) -> list[Array]:
 
 
 def run_step(gains: Gains, period_ms: float, start: Array, end: Array, seed: int) -> PlantRun:
-    """Run a plant from rest at `start` (n,) rad with the attractor at `end` (n,) rad, and return the recording.
+    """Run a plant from rest at `start` (n,) rad with the attractor (the commanded posture) at `end` (n,) rad; returns the recording.
 
     `period_ms`: control period, ms.  `seed`: seed of the plant's random numbers.
     """

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The cup on the table: scenes by seed, what the cameras see of them, and three planners of paths to the pre-grasp (thesis 4.3.3)."""
+"""The cup on the table: random scenes, what the cameras see of them, and three methods to reach the pre-grasp (thesis 4.3.3)."""

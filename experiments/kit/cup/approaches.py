@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Common code of the trials of the cup experiment: robot, pre-grasp map and start posture, and a planner that uses RRT-Connect."""
+"""Common code of the trials of the cup experiment: robot, pre-grasp map and start posture, and a planner that uses RRT-Connect.
+
+The pre-grasp map is a roadmap of postures in which the hand is beside a possible place of the cup.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +32,10 @@ def robot() -> Robot:
 
 
 def side_grasp(model: Model) -> SideGrasp:
-    """Return the grasps from the side with the right hand; `model`: the robot in the world that it must not touch."""
+    """Return the object that computes postures for grasps from the side with the right hand.
+
+    `model`: the robot in the world that it must not touch.
+    """
     return SideGrasp(model, MARKER, MOTORS, icub_starts(robot()))
 
 

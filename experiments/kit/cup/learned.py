@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The learned reacher of the cup experiment: an agent that learned to bring the palm beside a cup, on the offline plant."""
+"""The cup experiment's agent that learns, on an offline plant (a robot simulated in one process), to bring the palm beside a cup."""
 
 from __future__ import annotations
 
@@ -42,11 +42,11 @@ def learner() -> ReachAgent:
 
 
 def by_learner(plant: PhysicsPlant, thing: Upright) -> Approach:
-    """Bring the palm beside the cup `thing` as the agent has learned, and return the result as `Approach`.
+    """Bring the palm beside the cup `thing` by a plan of the agent that `learner` returns, and return the result as `Approach`.
 
-    The result always has 0 bumps, because they are not detected here, and 1 plan.  The arm moves through the states of the agent's plan;
-    then a reach follows, in which a force pulls the palm to its place beside the cup.  The agent learns nothing from this.  The returned
-    azimuth, the direction that the palm faces, is the planned one, even if the palm did not arrive.
+    The result always has 1 plan, and 0 bumps (unplanned contacts of the arm), because bumps are not detected here.  The arm moves through
+    the states of the agent's plan; then a reach follows, in which a force pulls the palm to its place beside the cup.  The agent learns
+    nothing from this.  The returned azimuth, the direction that the palm faces, is the planned one, even if the palm did not arrive.
     """
     agent, target = learner(), _target(thing)
     begun = time.process_time()

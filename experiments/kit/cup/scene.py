@@ -100,8 +100,8 @@ class Eyes:
     def show(self, world: World, cup: Upright, margin: float) -> None:
         """Add the cup, and the clutter that the cameras see, to a world.
 
-        Each of these objects is enlarged by `margin` [m] on all sides, and has the role "target".  `cup`: the cup as `Eyes.cup` returns it.
-        The places of the clutter get new random errors.
+        Each of these objects is enlarged by `margin` [m] on all sides, and has the role "target": it repels all links except a hand that
+        reaches for it.  `cup`: the cup as `Eyes.cup` returns it.  The places of the clutter get new random errors.
         """
         world.add(CUP, cylinder(RADIUS, HEIGHT).grown(margin), position=standing(cup.place, HEIGHT), role="target")
         for name, piece in self._scene.clutter.items():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One trial of the cup experiment: reach the pre-grasp, close the hand, lift the cup and put it at another place, judged in the physics."""
+"""One trial of the cup experiment: reach the pre-grasp, close the hand, lift the cup, put it elsewhere; judged by simulated true poses."""
 
 from __future__ import annotations
 
@@ -41,17 +41,17 @@ GOALS = 24
 
 @dataclass(slots=True)
 class Result:
-    """The measures of a trial, in m, rad and s; -1: not measured, because the trial ended earlier.
+    """The measures of a trial, in m, rad and s; -1 (0 for `lifted`): not measured, because the trial ended earlier.
 
     The pre-grasp is the pose with the open hand beside the cup.  Measured at the end of the motion to it: `distance`: distance of the palm
     from its wanted place beside the true cup.  `angle`: angle between the palm's normal and its wanted direction.  `pushed`: largest
-    distance by which a thing was moved.  `knocked`: whether a thing leans more than 25 degrees.  `pre_grasp`: whether `distance` is at most
-    2 cm, `angle` is at most 15 degrees, and nothing was knocked over.
+    distance by which an object was moved.  `knocked`: whether a movable object leans more than 25 degrees.  `pre_grasp`: whether `distance`
+    is at most 2 cm, `angle` is at most 15 degrees, and nothing was knocked over.
 
-    Measured at the end of the trial: `lifted`: height by which the cup was lifted.  `placed`: distance of the cup from its goal.  `done`:
-    whether the cup was lifted, and put down upright near its goal, and nothing was knocked over.  `bumps`: number of bumps on the motion to
-    the pre-grasp.  `plans`: how often a path was planned.  `planning`: processor time of the plans.  `clutter`: number of pieces of
-    clutter.  `why`: reason of a failure.  `seconds`: simulated time.
+    Measured later: `lifted`: height by which the cup was lifted from the table.  `placed`: horizontal distance of the cup from its goal at
+    the end.  `done`: whether the cup was lifted, and put down upright near its goal, and nothing was knocked over.  `bumps`: number of
+    bumps on the motion to the pre-grasp.  `plans`: how often a path was planned.  `planning`: processor time of the plans.  `clutter`:
+    number of pieces of clutter.  `why`: reason of a failure.  `seconds`: simulated time.
     """
 
     pre_grasp: bool = False

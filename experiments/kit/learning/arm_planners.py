@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Roadmaps of the published left arm, and planners that are compared with each other.
+"""Roadmaps of the left arm of the robot published in 2014 (four joints), and planners that are compared with each other.
 
 Vertices and edges of a roadmap are poses and motions that are free in the planner's own model of robot and world.  The graph is OMPL's PRM
 or the lattice of states on which the learners act.  The planners are: straight motions, a roadmap planned once, a roadmap replanned after
@@ -207,7 +207,7 @@ class Rival(Protocol):
     """A planner in a comparison: it chooses the next pose of the arm, and observes the outcome of the motion."""
 
     repairs: int
-    """Number of actions so far that did not end as the planner expected."""
+    """Number of actions so far that did not end as the planner expected; always 0 for a planner that learns nothing from outcomes."""
 
     def begin(self, goal: int) -> None:
         """Start a new query: reach the cell of the lattice state `goal`."""

@@ -26,8 +26,8 @@ def begin_anywhere(space: Space, plant: OfflinePlant, seed: int) -> None:
 def begin_nearby(space: Space, plant: Plant, seed: int) -> int:
     """Move the space's part of the robot to a random neighbour of its present state, and return the number of the state that was reached.
 
-    No agent learns from this motion.  An agent's action starts where its last action ended, but this motion may start anywhere in the cell
-    of a state.  `seed`: seed of the choice of the neighbour.
+    No agent learns from this motion, because it may start anywhere in the cell of a state.  After it, an agent's first action starts where
+    an action ended, as all later ones do.  `seed`: seed of the choice of the neighbour.
     """
     state = space.state_of(plant.measure(space.part))
     goal = int(np.random.default_rng(seed).choice(space.actions(state)))

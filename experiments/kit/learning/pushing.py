@@ -106,7 +106,7 @@ class Stage:
     Args:
         arrangement: postures, grid and first place of the cup.
         seed: of the random numbers of the plant, of the errors of perceived places, and of the agent.
-        explorer: name of the agent's explorer.
+        explorer: name of the rule by which the agent chooses its actions, such as "curious".
     """
 
     def __init__(self, arrangement: Arrangement, seed: int, explorer: str) -> None:

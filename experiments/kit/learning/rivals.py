@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Explorers of the literature for the agent of this library, and tabular worlds with rewards that the agent does not know in advance.
 
-An explorer decides which action an agent takes; each one here is a function as described at `mobee.learning.explorers.Explorer`.
+An explorer decides which action an agent takes; each one here is a callable object as described at `mobee.learning.explorers.Explorer`.
 `CountBonus`, `RMax` and `EpsilonGreedy` plan with the transition model of `learned`: frequencies of the outcomes that the agent observed.
 """
 

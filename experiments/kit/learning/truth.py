@@ -102,7 +102,7 @@ def l1(beliefs: OutcomeModel, truth: OutcomeModel) -> Array:
 
 
 def most_likely(truth: OutcomeModel) -> Array:
-    """Return the probability of the most likely outcome of each state-action, (S, A); NaN where the truth is unknown."""
+    """Return the probability of the most likely outcome of each state-action, (S, A); NaN without an action or a try."""
     highest: Array = truth.probabilities.max(axis=-1)
     return np.where(highest > 0.0, highest, np.nan)
 

@@ -137,12 +137,12 @@ def shrunk(schedule: Sequence[Fault], fails: Callable[[Sequence[Fault]], bool], 
 class FaultInjector:
     """Performs faults on the processes of one system.
 
-    The kinds: kill: the process of a service is killed.  freeze: it is stopped for a time, by a signal.  throttle: it is stopped and
-    continued every 50 ms.  disk: it cannot write a byte to a file.  files: it cannot open more than 20 files.  flood: one of
-    `floods.FLOODS` is sent.  token: a liveliness token with the name of a service is declared without a process.  duplicate: a second
-    process of a service is started.  stop: an emergency stop is sent.  The kinds in FORGED test that other clients cannot release an
-    emergency stop.  false_stop: an EStop message with `set = false` is sent.  release, arm: a call is sent whose sender pretends to be the
-    controller.
+    Kinds of faults: "kill": the process of a service is killed.  "freeze": it is stopped for a time, by a signal.  "throttle": it is
+    stopped and continued in turn, 50 ms each.  "disk": it cannot write a byte to a file.  "files": it cannot open more than 20 files.
+    "flood": one of `floods.FLOODS` (many messages, calls, tokens or connections) is sent.  "token": a liveliness token (the mark on the bus
+    that a process runs) with the name of a service is declared without a process.  "duplicate": a second process of a service is started.
+    "stop": an emergency stop is sent.  The kinds in FORGED test that other clients cannot release an emergency stop.  "false_stop": an
+    EStop message with `set = false` is sent.  "release", "arm": a call is sent whose sender pretends to be the controller.
     """
 
     def __init__(self, session: Any, endpoint: str, launcher: int | None = None, epoch: Callable[[], int | None] = lambda: None) -> None:

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Floods of messages, calls, liveliness tokens and connections, each from its own process: `python -m experiments.kit.live.floods`.
 
-A program needs no secret to send them: any program on the machine can do so that follows the documentation of the bus.
+A flood is one kind of message, call or token at a high rate, or 1000 idle connections, to disturb a live system.  It needs no secret: every
+program on the machine that follows the documentation of the bus can send it.
 """
 
 from __future__ import annotations
@@ -117,9 +118,10 @@ FLOODS: dict[str, Callable[[str], None]] = {
 
 @contextmanager
 def flood(endpoint: str, name: str) -> Iterator[None]:
-    """Send the flood `name`, one of FLOODS, from another process while the body of a `with` statement runs.
+    """Send a flood (messages at a high rate) from another process while the body of a `with` statement runs.
 
-    `endpoint`: address of the router.  Raises LaunchFailed at the end of the statement if the flood's process has already ended.
+    `name`: key of the flood in FLOODS.  `endpoint`: address of the router.  Raises LaunchFailed at the end of the statement if the flood's
+    process has already ended.
     """
     process = subprocess.Popen([sys.executable, "-m", "mobee_system.run", "experiments.kit.live.floods", endpoint, name])
     try:
@@ -132,7 +134,7 @@ def flood(endpoint: str, name: str) -> Iterator[None]:
 
 
 def main() -> None:
-    """Send the flood that the command line names (endpoint, name) until the process is killed."""
+    """Send a flood until the process is killed; command line: address of the router, and key of the flood in FLOODS."""
     endpoint, name = sys.argv[1:]
     FLOODS[name](endpoint)
 

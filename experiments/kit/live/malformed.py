@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Draws random messages, requests and tokens of the bus that are nearly valid.
+"""Draws random messages, requests and liveliness tokens of the bus that are nearly valid, to test a live system with wrong input.
 
-Keys and fields are those of the bus.  Most values are valid; run, tick and time are mostly those of the running system, or near.  Some
-values are extreme, odd or of a wrong length.  In some messages a field is left out, added or of another type.  In some the bytes are
-truncated, or one byte is changed.  `python -m experiments.kit.live.malformed` sends them.
+A liveliness token is a mark on the bus that disappears when its process dies; by it, other processes see that the process runs.  Keys and
+fields are those of the bus.  Most values are valid; run, tick and time are mostly those of the running system, or near.  Some values are
+extreme, odd or of a wrong length.  In some messages a field is left out, added or of another type.  In some the bytes are truncated, or one
+byte is changed.  `python -m experiments.kit.live.malformed` sends them.
 """
 
 from __future__ import annotations
@@ -86,7 +87,8 @@ class Drawn:
 class Drawer:
     """Draws nearly valid messages, requests and liveliness tokens; the same seed gives the same ones.
 
-    `parts`: number of motors of each part, by name.
+    A liveliness token is a mark on the bus that disappears when its process dies.  `seed`: of the draws.  `parts`: number of motors of each
+    part, by name.
     """
 
     def __init__(self, seed: int, parts: dict[str, int]) -> None:
@@ -111,7 +113,7 @@ class Drawer:
         return self._drawn(key, cls, self._parts[part], call=True, valid=verb not in ENDS)
 
     def token(self) -> str:
-        """Draw the key of a liveliness token that names a service, the router or an unknown process."""
+        """Draw the bus key of a liveliness token, which declares that a process runs: a service, the router or an unknown process."""
         who = self._random.choice((*SERVICES, "router", "stranger"))
         return keys.alive(who, f"i{self._random.randrange(INSTANCES)}")
 

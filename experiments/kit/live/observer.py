@@ -29,10 +29,10 @@ OLDEST = 0.1  # s between the beginning of a tick and of the last one in which a
 class Moment:
     """The state of a part at one tick.
 
-    `run`, `k`: identifier of the run, and number of the tick in it.  `t`: s, simulated time of the bus.  `at`: s, monotonic time of the
-    machine.  `gate`: state of the gate, the last check of commands before the motors, as "armed".  `mode`: kind of the command that the
-    part follows, as "hold".  `age`: number of ticks since the tick that this command answers; -1: no command.  `q`: measured positions of
-    the part's motors, rad.  `speed`: rad/s, of the fastest motor.
+    `run`, `k`: identifier of the run, and number of the tick in it.  `t`: s, simulated time since the start of the run.  `at`: s, monotonic
+    time of the machine.  `gate`: state of the gate, the last check of commands before the motors, as "armed".  `mode`: kind of the command
+    that the part follows, as "hold".  `age`: number of ticks since the tick that this command answers; -1: no command.  `q`: measured
+    positions of the part's motors, rad.  `speed`: rad/s, of the fastest motor.
     """
 
     run: str
@@ -147,9 +147,9 @@ class Observer:
 class Stop:
     """How a part came to rest after a fault.
 
-    `hold`: time [s] from the fault until the gate held the part; None if it was not held.  `rest`: time [s] from the fault until the held
-    part was at rest (all motors below 2 deg/s).  `distance`: largest displacement of a motor [rad] between the fault and rest.  Both are
-    None if the part did not come to rest in the observed time.
+    `hold`: time [s] from the fault until the part held, that is, followed no command any more; None if it did not hold.  `rest`: time [s]
+    from the fault until the holding part was at rest (all motors below 2 deg/s).  `distance`: largest displacement of a motor [rad] between
+    the fault and rest.  Both are None if the part did not come to rest in the observed time.
     """
 
     hold: float | None
@@ -195,7 +195,7 @@ def violations(states: Mapping[str, list[Moment]], robot: Robot, noise: float) -
 
     The guarantees: within a run the tick number increases, and no motor is faster than the safety gate of robot_sim allows.  A repeated
     tick 0 is no violation: in lockstep it is repeated until all services have answered.  `states`: states of each part, in order of
-    arrival, from one schedule of faults.  `noise`: largest error of the encoders, rad.
+    arrival, as `Observer.take` returns them.  `noise`: largest error of the encoders, rad.
     """
     found = []
     for part, moments in states.items():
@@ -238,7 +238,8 @@ class Kept:
 def compare_transitions(observer: Observer, run_dir: Path, agents: list[str]) -> Kept:
     """Compare the transitions that the agents published so far with those in the store of the run, and return the counts.
 
-    `run_dir`: folder of the run.  `agents`: names of the agents that are compared; they may still be learning.
+    `run_dir`: folder of the run.  `agents`: names of the agents whose published transitions are looked up in the store; they may still be
+    learning.  Transitions on disk, and those published twice with different values, are counted for all agents.
     """
     with observer.lock:
         published, conflicts = dict(observer.published), len(observer.conflicts)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads the recordings of robot_sim: joint positions of all ticks, and contacts of links with links or obstacles."""
+"""Reads what robot_sim, the robot simulator, recorded: joint positions of all ticks, and contacts of links with links or obstacles."""
 
 from __future__ import annotations
 

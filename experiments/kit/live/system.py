@@ -24,10 +24,10 @@ _STATES = "state"  # folder of states
 
 @dataclass
 class System:
-    """A running system.
+    """A running live system: the processes of the robot software, which exchange messages on a bus.
 
-    `process`: its launcher.  `endpoint`: address of its router.  `folder`: where the folder of the run, the error output and the file with
-    the record of emergency stops are.
+    `process`: the launcher, which starts and supervises all other processes.  `endpoint`: address of the system's Zenoh router.  `folder`:
+    contains the folder of the run, the launcher's error output, and the file with the record of the emergency stops.
     """
 
     process: subprocess.Popen[str]
@@ -36,7 +36,7 @@ class System:
 
     @property
     def run_dir(self) -> Path:
-        """The folder of the system's run."""
+        """The folder of the run, into which the system writes its files, such as the transitions of the agents."""
         return next((self.folder / "runs").iterdir())
 
     @property
@@ -46,15 +46,16 @@ class System:
 
     @property
     def says(self) -> str:
-        """The text that the launcher has written to standard error so far."""
+        """The text that the launcher (the process that starts all others) has written to standard error so far."""
         return (self.folder / "launcher.err").read_text()
 
 
 @contextmanager
 def running(folder: Path, scenario: str) -> Iterator[System]:
-    """Launch a scenario without monitor, yield the system when all its services are ready, and stop it at the end of the `with` statement.
+    """Launch a live system, yield it when all its services are ready, and stop it at the end of the `with` statement.
 
-    `folder`: an empty folder for its files.  `scenario`: name or path.  Raises LaunchFailed.
+    `folder`: an empty folder for its files.  `scenario`: name or path of the file that lists its services and their settings; the monitor
+    (the service that shows the robot on a web page) does not run.  Raises LaunchFailed.
     """
     endpoint = free_endpoint()
     environment = {**os.environ, "XDG_STATE_HOME": str(folder / _STATES)}

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Common code of the experiments on reaching: the arm, its targets, learners, the planner to compare with, and measured true outcomes."""
+"""Common code of the experiments on reaching: arm, targets, learners, a planner for comparison, and true outcomes of reaches."""

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The reaching right arm: robot, control laws, states, plants, learned transitions, and the model of a planner.
+"""Common functions of the experiments in which the right arm reaches: robot, control laws, lattices, plants and transition models.
 
-The four joints of the published lattice move; the wrist and the fingers are rigid at home.  `reach_space`, `reach_plant` and
-`learned_beliefs` are the published set-up (thesis 8.3): the robot of 2014, under either law, with actions to the states one level away
-along one joint.  The functions with an argument `law` (except `reach_plant`) belong to the experiments that compare with planners: today's
-robot under the law "default", or the robot of 2014 under the law "published", with actions to the 16 nearest states.
+The four joints of the published lattice (the discrete states of the arm) move; the wrist and the fingers are rigid at home.  `reach_space`,
+`reach_plant` and `learned_beliefs` are the published set-up (thesis 8.3): the robot of 2014, under the published or the default law, with
+actions to the states one level away along one joint.  The functions with an argument `law` (except `reach_plant`) belong to the experiments
+that compare with planners: today's robot under the law "default", or the robot of 2014 under the law "published", with actions to the 16
+nearest states.
 """
 
 from __future__ import annotations
@@ -52,8 +53,8 @@ class Law:
 def laws() -> dict[str, Law]:
     """Return a dict from "published" and "default" to these two control laws.
 
-    Under the published law the attractor stays at its place during a reach and pulls against the reach's force; under the default law the
-    marker arrives at the target.
+    Under the published law the attractor (the commanded posture) stays at its place during a reach and pulls against the force of the
+    reach; under the default law the marker (the palm) arrives at the target.
     """
     return {"published": Law(Gains.published_2014(), DT, "centre"), "default": Law(Gains.default(), 0.01, "surface")}
 
@@ -68,7 +69,7 @@ def reach_space() -> Lattice:
 
 
 def reach_plant(seed: int, law: str = "published") -> OfflinePlant:
-    """Return a plant of the robot of 2014 in an empty world, in which only the four motors of the right arm move.
+    """Return an offline plant of the robot of 2014 in an empty world, in which only the four motors of the right arm move.
 
     `seed`: seed of the plant's random numbers.  `law`: name of the control law, "published" or "default".
     """
@@ -139,10 +140,11 @@ def _motors(law: str) -> list[int]:
 
 
 def arm_plant(seed: int, world: World | None = None, motors: MotorParameters | None = None, law: str = "default") -> OfflinePlant:
-    """Return a plant in which only the four motors of the right arm move.
+    """Return an offline plant (the robot simulated in this process) in which only the four motors of the right arm move.
 
-    `seed`: seed of the plant's random numbers.  `world`: objects around the robot; None: an empty world.  `motors`: motor parameters; None:
-    the default ones.  `law`: "default" with today's robot, or "published" with the robot of 2014.
+    `seed`: seed of the plant's random numbers.  `world`: objects around the robot; None: an empty world.  `motors`: parameters of the
+    simulated motors, such as their delay; None: the default ones.  `law`: "default" with today's robot, or "published" with the robot of
+    2014.
     """
     chosen = laws()[law]
     return OfflinePlant(Model(body(law), world), seed, chosen.gains, motors, chosen.dt, active=RIGHT)
@@ -151,8 +153,9 @@ def arm_plant(seed: int, world: World | None = None, motors: MotorParameters | N
 def arm_belief(world: World | None = None, cables: bool = True, turns: Array | None = None, law: str = "default") -> PeerBelief:
     """Return the model of robot and world with which a planner plans motions of the right arm.
 
-    `world`: as the planner believes it to be; None: empty.  `cables`: whether it knows the cable constraints.  `turns`: (4,) rad, believed
-    minus measured joint angles; None: 0.  `law`: "default" with today's robot, or "published" with the robot of 2014.
+    `world`: as the planner believes it to be; None: empty.  `cables`: whether it knows the cable constraints.  `turns`: (4,) rad, error of
+    the encoders as the planner believes it: believed minus measured joint angles; None: 0.  `law`: "default" with today's robot, or
+    "published" with the robot of 2014.
     """
     clauses = [clause for clause in body(law).clauses if clause.part == PART] if cables else []
     return PeerBelief(Model(body(law), world), RIGHT, MARKER, clauses, laws()[law].gains, turns)
@@ -202,9 +205,10 @@ class Errors:
 
 
 class JudgedPlant(WrappedPlant[OfflinePlant]):
-    """An offline plant with calibration errors of encoders and eyes.
+    """An offline plant (the robot simulated in this process) with calibration errors of encoders and eyes.
 
-    Actions and reaches use the wrong readings.  But the outcome of a reach has the true position of the marker and the true error.
+    Actions and reaches use the readings with these errors.  But the outcome of a reach has the true position of the marker (the named point
+    on the hand that is brought to the target) and its true distance from the target.
 
     Args:
         plant: the plant that moves.
@@ -255,9 +259,10 @@ class JudgedPlant(WrappedPlant[OfflinePlant]):
         super().present(target)
 
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
-        """Pull the marker to the presented target, as in `mobee.reach.ReachPlant.reach`.
+        """Pull the marker (a named point on the hand) to the presented target, as in `mobee.reach.ReachPlant.reach`.
 
-        The outcome has the true position of the marker and the true remaining error.  `stay`: the part stays where the reach ended.
+        The outcome has the true position of the marker and its true distance from the target.  `stay`: the part stays where the reach
+        ended.
         """
         found = super().reach(part, marker, stay)
         self.reached = where = self.marker_at(marker, part, found.q)

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The model of robot and world of `PlannerPeer`: which poses and motions are allowed (sound), inverse kinematics, and RRT-Connect.
 
-Inverse kinematics: damped least squares from many start poses, all at the same time (Wampler 1986); `kit.reaching.targets.nearest_pose`
-searches one nearest pose.  Paths: OMPL's RRT-Connect (Kuffner and LaValle 2000), and shortcuts of its paths (Geraerts and Overmars 2007).
+Inverse kinematics: damped least squares from many start poses, all at the same time (Wampler 1986); in contrast,
+`kit.reaching.targets.nearest_pose` returns the one pose that is nearest to a place.  Paths: OMPL's RRT-Connect (Kuffner and LaValle 2000),
+and shortcuts of its paths (Geraerts and Overmars 2007).
 """
 
 from __future__ import annotations
@@ -34,13 +35,14 @@ solids and of fields (larger volumes that cause repulsive forces), except those 
 class PeerBelief:
     """A planner's model of robot and world.
 
-    A pose is sound if it is within the limits and away from blocked poses, violates no clause that the planner knows, and has no forbidden
-    contact.  A clause is a condition on several motor positions, which the shoulder's cables impose.
+    A pose is sound if it is within the limits of the motors and away from the poses in `blocked` (those to be avoided), violates no clause
+    that the planner knows, and has no forbidden contact.  A clause is a condition on several motor positions, which the shoulder's cables
+    impose.
 
     Args:
         model: the robot in the world, as the planner believes it to be; other code must not edit it.
         motors: names of the d motors with which motions are planned; all others stay at home.
-        marker: the marker that is brought to the target.
+        marker: name of the marker (a named point on a link, such as the palm) that is brought to the target.
         clauses: the clauses that the planner knows.
         gains: gains of the control law under which motions are executed.
         turns: (d,) rad, error of the encoders as the planner believes it: believed minus measured angles of the motors; None: 0.
@@ -168,12 +170,12 @@ RETREAT, CLEAR = 0.02, 0.2  # m, step away from the target, and largest distance
 def goals(
     belief: PeerBelief, target: ReachTarget, rng: np.random.Generator, most: int = MAX_POSES, free: bool = False
 ) -> tuple[Array, Array]:
-    """Return sound poses with the marker on the target, and for each of them a pose away from the target, (K, d) rad each; K may be 0.
+    """Return sound poses with the marker of `belief` on the target, and for each a pose away from the target, (K, d) rad each.
 
-    `PeerBelief` defines "sound".  From the pose away from the target the hand moves straight to the target.  The poses are sorted by the
-    forces of the fields (volumes that repel), the smallest first.  `rng`: for the random starts of the search.  `most`: largest number of
-    poses. `free`: True: return only poses in which no joint limit exerts a force; False: if none of these is found, return poses in which
-    joint limits exert forces.
+    K may be 0.  `PeerBelief` defines "sound".  From the pose away from the target the hand moves straight to the target.  The poses are
+    sorted by the forces of the fields (volumes that repel), the smallest first.  `rng`: for the random starts of the search.  `most`:
+    largest number of poses.  `free`: True: return only poses in which no joint limit exerts a force; False: if none of these is found,
+    return poses in which joint limits exert forces.
     """
     within = target.radius if target.aim == "surface" else 0.0
     trials = ((belief.limits, ARRIVED), (belief.range, ARRIVED), (belief.range, ALMOST))
@@ -199,7 +201,7 @@ def goals(
 
 
 def approach(belief: PeerBelief, starts: Array, place: Array, within: float, limits: Array, steps: int = STEPS) -> tuple[Array, Array]:
-    """Move the marker from poses `starts` (K, d) rad towards a place (3,) m, by damped least squares, all at the same time.
+    """Move the marker of `belief` from poses `starts` (K, d) rad towards a place (3,) m, by damped least squares, all at the same time.
 
     `within`: distance [m] from the place at which the marker has arrived.  `limits`: (d, 2) rad, of the motors.  `steps`: largest number of
     steps.  Returns the poses (K, d) rad and their remaining errors (K,) m.
@@ -220,7 +222,7 @@ def approach(belief: PeerBelief, starts: Array, place: Array, within: float, lim
 
 
 def retreat(belief: PeerBelief, pose: Array, place: Array) -> Array | None:
-    """Move the marker away from the target in steps, and return the first pose (d,) rad that is free of contacts; None if there is none.
+    """Move the marker of `belief` away from the target in steps; return the first pose (d,) rad without contacts, or None if there is none.
 
     The marker moves straight, in the direction from the target's centre to its position in `pose`, by up to 0.2 m.  `pose`: (d,) rad, with
     the marker on the target.  `place`: (3,) m, root frame, centre of the target.  In the returned pose no solids and no repulsive fields

@@ -161,7 +161,7 @@ class Course:
         """Processor time spent on plans so far, s."""
 
     def go(self) -> None:
-        """Make transitions until the plan says to reach, but at most 9; a new plan is made before each transition.
+        """Make transitions until the plan is to reach from the present state, but at most 9; a new plan is made before each transition.
 
         The reach itself is not made.
         """

@@ -46,7 +46,7 @@ class PeerMemory:
         return list(self._always), {place: list(poses) for place, poses in self._at_target.items()}
 
     def restore(self, knowledge: Knowledge) -> None:
-        """Replace the content of the memory by one that `knowledge` returned."""
+        """Replace the content of the memory.  `knowledge`: the new content, as the method `knowledge` returned it."""
         self._always, self._at_target = list(knowledge[0]), {place: list(poses) for place, poses in knowledge[1].items()}
 
     def clear(self) -> None:
@@ -168,7 +168,7 @@ ENDS: tuple[Ended, ...] = ("there", "used up", "no plan")
 
 @dataclass(frozen=True, slots=True)
 class PeerTry:
-    """The result of one attempt of the planner to bring the marker to a target.
+    """The result of one attempt of the planner to bring the marker (a named point on the hand) to a target.
 
     `missing`: true distance of the marker from the target [m], as `PeerPlant.missing` returns it.  It is measured after the last motion to
     a pose at the target.  If there was no such motion, it is measured at the end of the attempt.  `ended`: "there": the planner believes
@@ -211,19 +211,20 @@ class PeerPlant(Protocol):
         ...
 
     def present(self, target: ReachTarget | None) -> None:
-        """Put the target into the world, or move it there if it is in it already; None removes it (see `mobee.reach.ReachPlant`)."""
+        """Put the target into the world, or move the target that is there already; None removes it (see `mobee.reach.ReachPlant`)."""
         ...
 
     def missing(self, marker: str) -> float:
         """Return the true distance of the marker from the target now [m].
 
-        It is measured from the target's centre, or from its surface if the target's `aim` is "surface" (0 inside the target).
+        It is measured from the target's centre, or from its surface if the target's `aim` is "surface" (0 inside the target).  `marker`:
+        name of the marker, a point on the hand.
         """
         ...
 
 
 class PlannerPeer:
-    """Brings a marker to targets by planning, one target after the other, each from the present pose.
+    """Brings a marker (a named point on the hand) to targets by planning, one target after the other, each from the present pose.
 
     Args:
         plant: the plant that moves; motors that take no part in the planning keep their initial position.
@@ -256,7 +257,7 @@ class PlannerPeer:
         return self._known.knowledge()
 
     def restore(self, knowledge: Knowledge) -> None:
-        """Replace the content of the memory by one that `knowledge` returned."""
+        """Replace the content of the memory.  `knowledge`: the new content, as the method `knowledge` returned it."""
         self._known.restore(knowledge)
 
     def try_problem(self, target: ReachTarget, sees: Callable[[], ReachTarget] | None = None) -> PeerTry:

@@ -32,7 +32,7 @@ class Judge(ReachPlant, Protocol):
 
 
 class SeenHand:
-    """What a learner knows by seeing its hand.
+    """The hand as a learner sees it, and the errors of the encoders that are estimated from the seen positions.
 
     `offsets`: estimates the errors of the encoders of some motors.  All plants that `correct` returns share it, so the estimates are kept
     when a learner gets a new plant.  `is_seen`: whether the hand is seen at present.
@@ -49,7 +49,7 @@ class SeenHand:
         return judge.marker_at(MARKER) + error if self.is_seen else None
 
     def correct(self, judge: Judge) -> JudgedSeeingPlant:
-        """Return a plant that moves `judge`, but has corrected encoder values.
+        """Return a plant whose actions move the plant `judge`, and whose encoder values are corrected.
 
         The corrections are estimated from the positions at which the hand is seen.  `judge`: the plant with wrong encoders.
         """

@@ -5,9 +5,9 @@
 
 prints which of them inverse kinematics can reach; the table is in README.md of this folder.
 
-The figure gives no coordinates.  In the original's program, targets have x from -0.4 to -0.1, y from 0 to 0.4 and z from 0 to 0.4 m, in
-steps of 0.1, in the root frame: x is negative in front of the robot, y positive to its right, z positive upwards.  The grid here has every
-second of these values of y and z, and all values of x except the farthest, which only the stretched arm reaches.
+The figure gives no coordinates.  In the original program of 2014, targets have x from -0.4 to -0.1, y from 0 to 0.4 and z from 0 to 0.4 m,
+in steps of 0.1, in the root frame: x is negative in front of the robot, y positive to its right, z positive upwards.  The grid here has
+every second of these values of y and z, and all values of x except the farthest, which only the stretched arm reaches.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def grid() -> Array:
 
 
 def between() -> Array:
-    """Return the centres of the eight cells of the grid, (8, 3) m, root frame: positions of targets that no learner tries."""
+    """Return the centres of the eight cells between the positions of `grid`, (8, 3) m, root frame: no learner tries targets there."""
     return np.array(list(product(*((np.array(levels[1:]) + levels[:-1]) / 2.0 for levels in (X, Y, Z)))))
 
 
@@ -57,7 +57,7 @@ SLACK = 1e-6  # rad, allowed violation of a clause
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Nearest:
-    """The pose q (n,) rad that brings a marker nearest to a place, and the remaining distance, m."""
+    """The pose q (n,) rad that brings a marker (a named point on a link) nearest to a place, and the remaining distance, m."""
 
     q: Array
     distance: float
@@ -155,8 +155,8 @@ def touchable_targets(law: str = "default", free: bool = True) -> tuple[ReachTar
 
     These are the thesis' targets that the palm can touch, and random targets within the same box in place of the others.  The palm touches
     a target in a pose in which the cable constraints hold, and no solids have contact, except those of the hand with the target.  `law`:
-    "default" with today's robot, or "published" with the robot of 2014.  `free`: True: such a pose must exist in which no joint limit
-    exerts a force; False: joint limits may exert forces in it.
+    control law: "default" with today's robot, or "published" with the robot of 2014.  `free`: True: such a pose must exist outside the
+    zones near the joint limits in which the control law exerts repulsive forces; False: it may be in these zones.
     """
     belief, rng, places, aim = arm_belief(law=law), np.random.default_rng(27), grid(), laws()[law].aim
     found = [target for target in targets_at(places, aim) if touchable(belief, target, free)]
@@ -169,7 +169,8 @@ def touchable_targets(law: str = "default", free: bool = True) -> tuple[ReachTar
 def touchable(belief: PeerBelief, target: ReachTarget, free: bool = True) -> bool:
     """Return whether the marker can touch the surface of a target in the planner's model `belief`, into which the target is put.
 
-    `free`: whether this must be possible in a pose in which no joint limit exerts a force.
+    `free`: whether this must be possible in a pose outside the zones near the joint limits in which the control law exerts repulsive
+    forces.
     """
     to_surface = replace(target, aim="surface")
     belief.present(to_surface)

@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A toy arm of four joints with known true rewards, to compare learners of reaches quickly.
+"""A toy arm of four joints whose true rewards are known, to compare quickly how agents learn to reach for targets.
 
     python -m experiments.kit.reaching.toy_arm --seeds 3 --only gp
 
 The arm has two links on a shoulder of three joints, with the ranges of the iCub.  A reach moves the hand to the target by damped least
-squares, by at most half a radian per joint; its start pose is noisy.  Targets are balls, and most actions whose path passes through the
-target fail.
+squares, by at most half a radian per joint; its start pose is noisy.  Its reward is high if a small distance remains (thesis eq. 8.4).  An
+action in which the arm comes near the centre of a target (within 10 cm) is blocked, and mostly fails.
 
-The command prints a table with a row for each learner: its predictor, strategy and memory of failures.  All numbers are means over the
-seeds.  The columns 50 to 1600 have the rewards on the 27 targets, divided by those of an oracle, an agent that knows the true rewards.  The
-heading is the number of attempts to reach one target after which the learner is evaluated.  The column "new" has the same fraction for
-eight other targets, the centres of the cells of the grid of 27.  The learner never tries them; it is evaluated on them after 800 attempts.
-The column "s" has the run time per seed [s].
+The command prints a table with a row for each learner, named by its predictor of rewards, its exploration strategy and its memory of failed
+actions.  All numbers are means over the seeds.  The headings of the columns 50 to 1600 are numbers of attempts to reach one target.  These
+columns have the learner's rewards on the 27 targets after so many attempts, divided by those of an oracle, an agent that knows the true
+rewards.  The column "new" has the same fraction for eight other targets, the centres of the cells of the grid of 27.  The learner never
+tries them; it is evaluated on them after 800 attempts.  The column "s" has the run time per seed [s].
 """
 
 from __future__ import annotations
@@ -118,7 +118,7 @@ SURE_FAILURES = 20  # failures after which an action is not tried again
 
 
 class ToyArm(ReachTable):
-    """The lattice of the right arm, 81 states, as a `mobee.learning.reaching.tabular.ReachTable` with the reaches of the toy arm.
+    """The toy arm as a plant with 81 states, a `mobee.learning.reaching.tabular.ReachTable` (plant whose outcomes are given by tables).
 
     `seed`: seed of the random outcomes.  `start`: the first state.
     """
@@ -215,7 +215,10 @@ def true_rewards(target: Array) -> Array:
 
 
 def blocked(target: Array) -> NDArray[np.bool_]:
-    """Return which actions are blocked by a target, (S, A); `target`: (3,) m, its position relative to the shoulder."""
+    """Return which actions are blocked by a target, (S, A): on their path the arm comes within 10 cm (CLEARANCE) of its centre.
+
+    `target`: (3,) m, its position relative to the shoulder.  An action that leads away from the target is not blocked (`swept`).
+    """
     space = toy_space()
     found: NDArray[np.bool_] = swept(space.samples, space.samples[space.goals], target, CLEARANCE) & (space.goals >= 0)
     return found

@@ -5,9 +5,9 @@ Every reach and every transition is tried several times on the offline plant.  E
 stays in the world as long as the arm is in a state with remaining tries.  Otherwise the target is removed, the arm moves to a state with
 remaining tries, and the target is put back.
 
-The oracle is an agent that plans and is evaluated like the learners, with the same discount, model of free transitions and limit of
-actions.  But it knows the mean rewards and the blocked transitions.  Its score is an upper bound for learners.  A learner can exceed it by
-chance, and slightly if it knows how transitions fail.
+The oracle is an agent that plans and is evaluated like the learners, with the same discount, limit of actions, and model of transitions
+without targets.  But it knows the mean rewards and the blocked transitions.  Its score is an upper bound for learners.  A learner can
+exceed it by chance, or slightly by its knowledge of failures: the oracle only knows which transitions failed in at least half of the tries.
 """
 
 from __future__ import annotations
@@ -38,10 +38,11 @@ BLOCKED = 0.5  # share of failed tries from which a transition counts as blocked
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tried:
-    """Results of trying every reach and every transition with one target in the world.
+    """Results of trying every reach and every transition with one target in the world; S states with up to A actions.
 
-    `missing`: (S, n) m, remaining errors of n tries to reach from each state; NaN for tries that were not made.  `made`: (S, A), number of
-    tries of each transition.  `failed`: (S, A), number of these tries that did not end in the goal of the transition.
+    `missing`: (S, n) m, distances of the marker from the target after n tries to reach from each state; NaN for tries that were not made.
+    `made`: (S, A), number of tries of each transition.  `failed`: (S, A), number of these tries that did not end in the goal of the
+    transition.
     """
 
     missing: Array
@@ -57,7 +58,8 @@ class Tried:
 class Truth:
     """Results of trying every reach and every transition with each of T targets in the world, one at a time.
 
-    `places`: (T, 3) m, root frame.  `missing`: (T, S, n) m, remaining errors of n tries to reach; NaN where a state was not entered.
+    `places`: (T, 3) m, root frame, of the targets.  `missing`: (T, S, n) m, distances of the marker from the target after n tries to reach
+    (the remaining errors); NaN where a state was not entered.
     `blocked`: (T, S, A), share of the tries of each transition that failed; NaN without tries.
     """
 
@@ -101,7 +103,8 @@ def truth_of(measured: Mapping[tuple[float, ...], Mapping[str, Any]]) -> Truth:
 def measure(place: Array, law: str = "published", tries: int = TRIES, seed: int = SEED) -> Tried:
     """Try every reach and every transition `tries` times, with the target at a place (3,) m, root frame, and return the results.
 
-    `law`: control law, "published" or "default"; the robot is that of 2014 under both.  `seed`: seed of the plant and of random choices.
+    `law`: control law, "published" or "default"; with both, the robot is the one published in 2014.  `seed`: seed of the plant and of
+    random choices.
     """
     target = ReachTarget(place, aim=laws()[law].aim)
     return _Measuring(reach_space(), reach_plant(seed, law), target, tries, seed).run()
@@ -215,8 +218,9 @@ Enter = Callable[[int], bool]  # goes to a state, and returns whether it was ent
 def remaining_errors(plant: ReachPlant, space: Space, targets: Sequence[ReachTarget], enter: Enter | None = None) -> Array:
     """Make one reach from each of the S states for each of the T targets; returns the remaining errors, (T, S) m.
 
-    NaN where the state was not entered.  The plant moves.  `enter`: function that takes a state, moves the plant to it, and returns True if
-    the plant arrived there.  None: the target is removed, and up to three actions are made to arrive there.
+    A remaining error is the distance of the marker from the target after the reach; NaN where the state was not entered.  The plant moves.
+    `enter`: function that takes a state, moves the plant to it, and returns True if the plant arrived there.  None: the target is removed,
+    and up to three actions are made to arrive there.
     """
     enter = enter or partial(_entered, plant, space)
     missing = np.full((len(targets), len(space)), np.nan)

@@ -29,8 +29,8 @@ COLORS = 64  # of a GIF
 def film(run: Path, file: Path, progress: Callable[[float], None] = lambda share: None) -> Path:
     """Write a film of a run as .gif or .mp4 and return `file`.
 
-    `run`: folder of the run. `progress` is called with the share of the frames that are finished, 0 to 1. Raises MobeeError if the run has
-    no record of a monitor, InvalidValue for another file suffix, NotInstalled if a package for films is missing.
+    `run`: folder of the run. `progress` is called with the share of the frames that are finished, 0 to 1. Raises MobeeError if the
+    monitor has not recorded the run, InvalidValue for another file suffix, NotInstalled if a package for films is missing.
     """
     if file.suffix not in (".gif", ".mp4"):
         raise InvalidValue(f"{file}: a film is a .gif or a .mp4: give a name with one of these endings.")

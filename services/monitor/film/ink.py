@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The colours, fonts and marks of a film. They match those of the page (web/files/page.css)."""
+"""The colours, fonts and marks of a film. They match those of the monitor's web page (web/files/page.css)."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ class StoryView:
         self._colors, self._fonts = colors, fonts
 
     def draw(self, ink: Any, values: dict[str, Any], box: tuple[int, int, int, int]) -> None:
-        """Draw the cards of the agents, one below the other, and below them a panel with their learning curves.
+        """Draw the cards of the agents (panels with text), one below the other, and below them a panel with their learning curves.
 
         `ink`: drawing context of Pillow. `values`: recorded values at one time, as returned by `services.monitor.past.Story.at`. `box`:
         left, top, right and bottom [pixels].

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Simulates random and least-tried exploration with the outcomes that an agent has learned, to compare these explorers with it."""
+"""Simulates two explorers (exploration strategies), random and least-tried, to compare their learning curves with that of an agent.
+
+The simulations use the outcomes of actions that the agent has observed.
+"""
 
 from __future__ import annotations
 

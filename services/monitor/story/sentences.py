@@ -68,7 +68,8 @@ def wants_sentence(decision: Decision, untried: Sequence[int], actions: Sequence
     """Describe where the agent's plan leads and why.
 
     `untried`: for each state, how many of its actions were never tried. `actions`: for each state, the number of all its actions. The text
-    is empty if the last state of the plan has no entry in `untried`; for explorers that do not plan, these numbers are not used.
+    is empty if the last state of the plan has no entry in `untried`; for explorers (exploration strategies) that do not plan, these
+    numbers are not used.
     """
     if decision.explorer in WITHOUT_PLAN:
         return f"nothing in particular: {WITHOUT_PLAN[decision.explorer]}."

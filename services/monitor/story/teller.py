@@ -130,7 +130,7 @@ class Teller:
         self.changed |= {"cards", "left", "curves"}
 
     def note_reach(self, part: str, reach: Reach) -> None:
-        """Store the newest message about a reach of a part, in progress or ended."""
+        """Store the newest message about a reach (motion of a marker of the part to a target), in progress or ended."""
         agent = self._agent(part)
         if agent is not None and agent.reach != reach:
             self._drop_playback()

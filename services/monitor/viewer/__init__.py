@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The 3D view of the page and the recording, in Rerun."""
+"""The 3D view of the robot in Rerun, for the monitor's page and for its recording."""
 
 import os
 

@@ -27,9 +27,9 @@ def drawn(
 ) -> rr.AsComponents:
     """Return a shape as a Rerun component, filled with a colour.
 
-    `size` [m]: (radius,) of a sphere, (radius, length) of a capsule or cylinder, three edge lengths of a box. `position`: centre, (3,) m.
-    `rotation`: (3, 3). `color`: red, green, blue, opacity, 0 to 255. `vertices`: (v, 3) m in the frame of the shape, for kind "convex"
-    only.
+    `size` [m]: (radius,) of a sphere, (radius, length) of a cylinder or of a capsule without its caps, three edge lengths of a box.
+    `position`: centre, (3,) m. `rotation`: (3, 3). `color`: red, green, blue, opacity, 0 to 255. `vertices`: (v, 3) m in the frame of the
+    shape, for kind "convex" only.
     """
     w, x, y, z = quaternion_from_matrix(rotation)
     turns, colors, fill = [rr.Quaternion(xyzw=[x, y, z, w])], [color], rr.components.FillMode.Solid

@@ -133,8 +133,8 @@ class Frames:
         """Return the data that a viewer needs after it has shown frame `after`. Any thread may call this.
 
         The call waits for a newer frame for at most `patience` s. The bytes, all little-endian: number of the frame (uint64), its time
-        (float64, s), and pieces of data. Before each piece stands its length in bytes (uint32). If there is no newer frame, there are no
-        pieces.
+        (float64, s), and pieces of data. Each piece is a complete Rerun file; before it stands its length in bytes (uint32). If there is no
+        newer frame, there are no pieces.
         """
         give_up = time.monotonic() + patience
         with self._published:

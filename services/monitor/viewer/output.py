@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The outputs of the monitor: a page on the loopback interface, a recording, or both."""
+"""The outputs of the monitor: a web page, a recording, or both."""
 
 from __future__ import annotations
 

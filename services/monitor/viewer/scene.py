@@ -87,7 +87,7 @@ class Scene:
         self._updates += 1
 
     def set_objects(self, objects: list[ObjectState]) -> None:
-        """Show all objects of the model's world, and remove those that the world no longer contains."""
+        """Show all objects of the world of the service `model`, and remove those that this world no longer contains."""
         known = {thing.name: thing for thing in objects}
         for name in self._objects.keys() - known.keys():
             self._stream.log(f"scene/objects/{name}", rr.Clear(recursive=False))

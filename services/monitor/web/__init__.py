@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The web server of the page, and what the page shows."""
+"""The web server of the monitor's page, and the values that the page shows."""

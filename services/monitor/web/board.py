@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Holds the newest value of everything that the page shows. A page asks for what has changed since its last request."""
+"""Holds the newest value of everything that the monitor's web page shows. A page asks for what has changed since its last request."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class _Item:
 
 
 class Board:
-    """The named values that the page shows.
+    """The named values that the monitor's web page shows.
 
     Each change has a number (version). A slow page skips old versions and always gets the newest. Any thread may call the methods.
     """
@@ -49,7 +49,7 @@ class Board:
             self._record(name, text)
 
     def record(self, name: str, value: Any) -> None:
-        """Write a value to the record only; the page does not show it."""
+        """Pass a value to the function `record` that was given to `__init__` (it records the run); the page does not show the value."""
         if self._record is not None:
             self._record(name, json.dumps(value, separators=(",", ":")))
 

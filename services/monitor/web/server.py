@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The web server of the page, on loopback: sends its files, the new values on the `Board` and the 3D view, and receives commands.
+"""The web server of the monitor's page: sends its files, the new values on the `Board` and the 3D view, and receives commands.
 
-Commands need the key, a secret word in the address of the page. A page without the key shows everything, but cannot send commands.
+It refuses requests that do not address it by a name of loopback, such as 127.0.0.1. Commands need the key, a secret word in the address of
+the page. A page without the key shows everything, but cannot send commands.
 """
 
 from __future__ import annotations
@@ -59,7 +60,7 @@ class Controls(Protocol):
 
 
 class Frames(Protocol):
-    """The data of the 3D view."""
+    """A source of the data of the 3D view, as numbered frames."""
 
     def newest(self, after: int, patience: float) -> bytes:
         """Return the encoded data that a viewer needs after it has shown frame `after`; wait at most `patience` s for a newer frame.

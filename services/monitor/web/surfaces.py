@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The robot as triangles, for the page's own 3D drawing."""
+"""The robot as triangles, for the 3D view that the monitor's web page draws itself; its other 3D view is the Rerun viewer."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ from services.common.service import Service
 class BabblerNode:
     """Commands random postures one after the other, and writes each command that has ended to the log.
 
-    In lockstep every tick waits for its answer; it answers when it has sent its commands for this tick.
+    In lockstep each tick waits for the answer of this service, which answers when it has sent its commands for the tick.
     """
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:

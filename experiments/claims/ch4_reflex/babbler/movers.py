@@ -51,7 +51,8 @@ class PartStreams(Generic[_M]):
 class AtDrives:
     """Sends position commands to the drives of all parts in every tick, along minimum-jerk moves from posture to posture.
 
-    If the safety layer ends a move, all parts are armed (released to follow commands) again, and the next move begins where the robot is.
+    If the safety layer (the checks of commands before the motors) ends a move, all parts are armed (released to follow commands) again, and
+    the next move begins where the robot is.
     """
 
     def __init__(self, service: Service, robot: Robot, targets: Targets, speed: float, note: Callable[[Commanded], None]) -> None:

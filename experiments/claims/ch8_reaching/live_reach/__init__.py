@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The learned reacher and a planner on the live robot; the module `claim` defines the experiment."""
+"""The experiment in which a learned agent and a planner reach for targets with the live robot; the module `claim` defines it."""

@@ -1,18 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compare the learned reacher with a planner on the live robot, in lockstep.
+"""Compare an agent that has learned to reach for targets (the learned reacher) with a planner on the live robot, in lockstep.
 
 Claim: a learned reacher that was trained offline and refined live brings the palm from random poses to within 2 cm of a target's surface:
 for at least 95 % of the reachable ones among the thesis' 27 targets, and for 90 % of new random targets, without a solid contact deeper
 than 2 mm.  Source: aim of this reproduction (thesis 8, 9.3).  Published: no number.  Run time: 10 to 25 minutes per start on 2 cores.
 
-Seven joints of the right arm of the robot `icub` move at its table, under the default law, with ticks of 20 ms; PyBullet (with --backend
-mujoco: MuJoCo) simulates the robot, with gravity.  In each start (independent repetition) a learner (`ReachAgent` with predictor "gp",
-strategy "ucb" and failures "alike") makes 3000 curious transitions and 800 tries of the 27 targets on the offline plant with the identified
-motors, then 54 live tries.  Then, without learning, it tries each of the 27 and 50 new targets, each from another pose, with up to three
-reaches per try.  The planner ("peer": inverse kinematics and RRT-Connect, with a new plan after every change) has the same targets, poses
-and robot, and the true model; the target exerts no force while the planner moves the arm, because the planner avoids it.  The learner also
-tries 8 targets that move back and forth over 15 cm at 3 cm/s, and 8 targets at rest, while a ball with a diameter of 8 cm crosses the
-hand's path at the same speed.  The ball is in the model and in the simulator.
+Seven joints of the right arm of the robot `icub` move at its table, under the default control law, with ticks of 20 ms; PyBullet (with
+--backend mujoco: MuJoCo) simulates the robot, with gravity.  In each start (independent repetition) a learner (`ReachAgent` with predictor
+"gp", strategy "ucb" and failures "alike") makes 3000 curious transitions (actions for information gain, without a target) and 800 tries of
+the 27 targets on the offline plant (simulation in one process) with the identified motors, then 54 live tries.  Then, without learning, it
+tries each of the 27 and 50 new targets, each from another pose, with up to three reaches per try.  The planner ("peer": inverse kinematics
+and RRT-Connect, with a new plan after every change) has the same targets, poses and robot, and the true model; the target exerts no force
+while the planner moves the arm, because the planner avoids it.  The learner also tries 8 targets that move back and forth over 15 cm at 3
+cm/s, and 8 targets at rest, while a ball with a diameter of 8 cm crosses the hand's path at the same speed.  The ball is in the model and
+in the simulator.
 
 A target can be reached if inverse kinematics finds a pose within limits and cables, with the palm within 2 cm of the surface, in which the
 only contact of solids is that of hand and target (experiments/kit/reaching/README.md shows which).  All new targets can be reached.  A try
@@ -218,7 +219,8 @@ def _left() -> frozenset[int]:
 def perform(folder: Path, job: Job, seed: int, rate: float = RATE, backend: str = PHYSICS[0]) -> bool:
     """Launch a live system that performs one job, and records every tick in the folder; returns whether the run is repeatable.
 
-    `seed`: of the simulated robot.  `rate`: ticks per second.  `backend`: physics engine.  Raises LaunchFailed.
+    `job`: a block of tries (see `Job`).  `seed`: of the simulated robot.  `rate`: ticks per second.  `backend`: physics engine.  Raises
+    LaunchFailed.
     """
     write_job(folder, job)
     world, seconds = WITH_OBSTACLE if job.kind == "moving" else TABLE, MAX_TRY * max(1, len(job.problems) + job.tries)
@@ -230,7 +232,8 @@ def perform(folder: Path, job: Job, seed: int, rate: float = RATE, backend: str 
 def tries_of(blocks: Sequence[Block], contestant: str, kind: str, numbers: frozenset[int] | None = None) -> list[Judged]:
     """Return all tries of a contestant on one kind of target, or with `numbers` only the tries of targets with these numbers.
 
-    `contestant`: kind of the block, as "learner" or "peer".  `kind`: "grid", "fresh", "target moves" or "obstacle moves".
+    `contestant`: kind of the blocks, as "learner" or "peer" (the planner); a block has all tries of one `Job`.  `kind`: "grid", "fresh",
+    "target moves" or "obstacle moves".
     """
     found = [tried for block in blocks if block.kind == contestant for tried in block.tries if tried.kind == kind]
     return [tried for tried in found if numbers is None or tried.number in numbers]
@@ -257,10 +260,10 @@ def enough(tries: Sequence[Judged], least: float) -> bool | None:
 
 @dataclass(frozen=True)
 class Runs:
-    """The finished blocks of tries, and which of the thesis' 27 targets can be reached, by number.
+    """The finished blocks (each with all tries of one job), and which of the thesis' 27 targets can be reached, by number.
 
-    `touchable`: targets for which inverse kinematics finds a pose that touches them.  `left`: those of them that a reach of the offline
-    plant can also touch.  From the rest of `touchable` the robot's own repulsive fields keep the palm away.
+    `touchable`: targets for which inverse kinematics finds a valid pose with the palm within 2 cm of the surface.  `left`: those of them to
+    which a reach of the offline plant comes as near.  From the others in `touchable`, the robot's own repulsive fields keep the palm away.
     """
 
     blocks: Sequence[Block]

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Performs a block of tries on the live robot: by the learner (which may continue to learn), by the planner, or by the reach alone.
+"""Performs a job, a list of tries, on the live robot: by the learner (which may continue to learn), by the planner, or by single reaches.
 
-`learned_offline` makes the learner's tries on the offline plant, for comparison.
+In a reach a force pulls the palm to the target.  `learned_offline` makes the learner's tries on the offline plant (the robot simulated in
+one process), for comparison.
 
-The performer, a service that calls a function of an experiment (experiments/kit/live/performer), calls `perform`.  It reads {part}/motion,
-{part}/reach and commands, and calls {part}/rpc/{take,goal,reach} of the controller and model/rpc/world/{add,remove}.
+The performer, a service that calls a function of an experiment (experiments/kit/live/performer), calls `perform`.  This function reads the
+streams {part}/motion, {part}/reach and commands, and calls {part}/rpc/{take,goal,reach} of the controller and model/rpc/world/{add,remove}.
 """
 
 from __future__ import annotations
@@ -48,9 +49,9 @@ from services.common.service import Service
 
 
 def perform(service: Service, folder: Path) -> None:
-    """Do the job that is written in the folder, and append a record of each try to the folder.
+    """Make the tries of the job in `folder`, and append the record of each try to a file in that folder.
 
-    The launched performer calls this function with its own service.
+    In a job of the kind "refine" the learner first continues to learn.  The launched performer calls this function with its own service.
     """
     job, robot = read_job(folder, Job), load_robot(service.config.robot)
     with ExitStack() as stack:
@@ -164,10 +165,10 @@ def learned(hand: Hand, agent: ReachAgent, seed: int, mover: Mover | None, probl
 
 
 def learned_offline(job: Job) -> Block:
-    """Let the learner attempt the problems of a job on the offline plant, and return the block of tries.
+    """Let the learner attempt the problems of a job on the offline plant, and return all tries with their measures.
 
-    The learner is loaded from the job's store, with all that it learned offline and live.  It attempts the problems as in `learned`, and
-    learns nothing.  Contacts are not recorded, so the block has none.
+    The learner is loaded from the file `job.store`, with all that it learned offline and live.  It attempts the problems as in `learned`,
+    and learns nothing.  Contacts are not recorded, so the block has none.
     """
     plant, tries = offline_plant(job.seed), list[Judged]()
     agent = load_reaches(job.store, plant, PART)
@@ -230,7 +231,10 @@ def planned(hand: Hand, seed: int, problem: Problem) -> Ended:
 
 
 def at_once(hand: Hand, problem: Problem) -> Ended:
-    """Attempt a problem by one reach from the present posture, without a plan; returns the result."""
+    """Attempt a problem by one reach from the present posture, without a plan; returns the result.
+
+    In a reach a force pulls the palm to the target.
+    """
     hand.present(problem.target)
     missing = hand.reach(PART, MARKER).missing
     return Ended([hand.end], 1, missing, first=hand.first)
@@ -266,9 +270,9 @@ class PeerPlant(WrappedPlant[Hand]):
         super().present(target)
 
     def missing(self, marker: str) -> float:
-        """Return the present distance of the marker from the target by the encoders, m; inf without a target.
+        """Return the distance of the marker from the target now, computed from the encoder values, m; inf without a target.
 
-        The tick of the call is appended to `ends`.
+        The tick of the call is appended to the list `ends` of this plant.
         """
         self.ends.append(self.inner.tick)
         whole = self.robot.home.copy()

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Times the reaches of the live arm, and moves a target or an obstacle during a reach."""
+"""A plant that times the reaches of the live arm, and an object that moves a target or an obstacle during a reach.
+
+In a reach a force pulls the palm to a target.
+"""
 
 from __future__ import annotations
 
@@ -78,7 +81,7 @@ class Hand(BusPlant):
 
 
 class Mover:
-    """Moves one object back and forth at 3 cm/s, as a participant of the lockstep.
+    """Moves one object back and forth at 3 cm/s; its service takes part in the lockstep (every tick waits for all participants).
 
     It moves the object in the world of the model and, if it is the obstacle, in the simulator.
     """

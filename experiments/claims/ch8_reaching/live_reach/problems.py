@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The live arm and its problems: robot, law and states, targets, first poses, and the learner that is trained offline.
+"""The arm of the live robot and its problems: robot, control law, states, targets, first poses, and the learner that is trained offline.
 
 A problem is a target to be reached from a random first pose.  The targets are the thesis' 27 and new ones between them.  In most problems
 nothing moves; in the others the target moves, or an obstacle.
@@ -59,7 +59,7 @@ def robot() -> Robot:
 
 
 def world(path: Path = TABLE) -> World:
-    """Return the world in the file `path`, by default the table."""
+    """Return the world in the file `path`, by default that with the iCub's table and nothing on it."""
     return load_world(str(path))
 
 
@@ -105,7 +105,7 @@ class Problem(Struct, frozen=True):
 
 
 def grid_targets() -> list[ReachTarget]:
-    """Return the 27 targets of the thesis: spheres of 10 cm on a grid in the workspace."""
+    """Return the 27 targets of the thesis: spheres with a diameter of 10 cm on a grid in the workspace."""
     return [ReachTarget(place, aim=AIM) for place in grid()]
 
 
@@ -208,7 +208,10 @@ def _begun(known: PeerBelief, kind: str, number: int, target: ReachTarget, rng: 
 
 
 def posture(known: PeerBelief, q: Array) -> Array:
-    """Return the posture of the whole part (n_part,) rad from the angles `q` of the planned motors (d,) rad; the others are at home."""
+    """Return the posture of the right arm (n_part,) rad from the angles `q` (d,) rad of the motors that the planner moves.
+
+    The other motors are at home.  `known`: the planner's model, as `belief` returns it.
+    """
     found: Array = known.whole(q)[robot().parts[PART].slice]
     return found
 

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tries on the live robot: what a launch is to do, the record of each try, and measures computed from the simulator's joint positions.
+"""Tries on the live robot: the job of a launch (one run of the live system), the record of each try, and its measures.
+
+The measures are computed from the simulator's joint positions.
 
     python -m experiments.claims.ch8_reaching.live_reach.tries
 
-prints, within minutes, for each of the 27 targets that can be reached, how near a reach of the offline plant comes to it, and, if the reach
-misses, the contacts at its end.
+simulates reaches on the offline plant, for minutes.  For each of the thesis' 27 targets that the palm can touch, it prints the distance of
+the palm from the target's surface after the best reach, and, if this reach misses, the contacts at its end.
 """
 
 from __future__ import annotations
@@ -47,9 +49,9 @@ Kind = Literal["refine", "learner", "peer", "offline", "moving", "first motion"]
 class Job(Struct, frozen=True):
     """A block of tries in one launch of the live system.
 
-    `kind`: who makes the tries.  "learner": the learner; "offline": the learner on the offline plant; "moving": the learner, while a target
-    or an obstacle moves; "peer": the planner; "first motion": single reaches, timed; "refine": the learner continues to learn.  `seed`: of
-    the contestant.  `problems`: targets that are tried, with the first postures of the arm.
+    `kind`: the contestant, which makes the tries.  "learner": the learner; "offline": the learner on the offline plant; "moving": the
+    learner, while a target or an obstacle moves; "peer": the planner; "first motion": single reaches, timed; "refine": the learner
+    continues to learn.  `seed`: of the contestant.  `problems`: targets that are tried, with the first postures of the arm.
     """
 
     kind: Kind
@@ -62,15 +64,15 @@ class Job(Struct, frozen=True):
 
 
 class Tried(Struct, frozen=True):
-    """The record of one try by the contestant; ticks are those of robot_sim.
+    """The record of one try by the learner, the planner or a single reach; times are ticks of the simulator (service robot_sim).
 
-    `kind`, `number`: of the problem.  `out`: tick at which the arm started towards its first posture.  `begin`: tick at which the target
-    was presented.  `ends`: ticks at which reaches ended; of the planner, ticks at which it measured its remaining distance from the target.
-    `over`: tick at which the arm was at rest again.  `off`: largest error of a joint in the first posture, rad.  `actions`: number of
-    actions, reaches included.  `believed`: distance of the palm from the target's surface at the end, by the encoders, m.  `thinking`:
-    processor time for plans, s.  `why`: reason if the try ended without a reach.  `asked`: tick of the last request that was sent to the
-    arm.  `there`: position of a moving target at the last tick in `ends`, m; None: the target is at rest.  `first`: ticks from `asked` to
-    the first command that moves the arm; -1: not timed.
+    `kind`, `number`: of the `Problem` (target and first posture).  `out`: tick at which the arm started towards its first posture.
+    `begin`: tick at which the target was presented.  `ends`: ticks at which reaches ended; of the planner, ticks at which it measured its
+    remaining distance from the target.  `over`: tick at which the arm was at rest again.  `off`: largest error of a joint in the first
+    posture, rad.  `actions`: number of actions, reaches included.  `believed`: distance of the palm from the target's surface at the end,
+    by the encoders, m.  `thinking`: processor time for plans, s.  `why`: reason if the try ended without a reach.  `asked`: tick of the
+    last request that was sent to the arm.  `there`: position of a moving target at the last tick in `ends`, m; None: the target is at rest.
+    `first`: ticks from `asked` to the first command that moves the arm; -1: not timed.
     """
 
     kind: str
@@ -92,12 +94,13 @@ class Tried(Struct, frozen=True):
 class Judged(Struct, frozen=True):
     """The measures of one try, computed from the simulator's joint positions.
 
-    `kind`, `number`: of the problem.  `position`: of the target, m.  `off`: distance of the palm from the target's surface at the end of
-    the try (of its last reach, or of the planner's last motion), m.  `success`: whether this is at most 2 cm.  `seconds`: robot time from
-    the presentation of the target to the end of the try.  `actions`: number of actions, including the `reaches`.  `thinking`: processor
-    time for plans, s.  `deep`: contacts of solids deeper than 2 mm.  `begun_off`: largest error of a joint in the first posture, rad.
-    `why`: reason if the try was interrupted.  `first`: ticks from the last request (`Tried.asked`) to the first command that moves the arm;
-    `first_motion`: ticks from that request to the first motion of a joint; -1: not timed.
+    `kind`, `number`: of the `Problem` (target and first posture).  `position`: of the target's centre, m, root frame.  `off`: distance of
+    the palm from the target's surface at the end of the try (of its last reach, or of the planner's last motion), m.  `success`: whether
+    this is at most 2 cm.  `seconds`: robot time from the presentation of the target to the end of the try.  `actions`: number of actions,
+    including the `reaches`.  `thinking`: processor time for plans, s.  `deep`: contacts of solids deeper than 2 mm.  `begun_off`: largest
+    error of a joint in the first posture, rad.  `why`: reason if the try was interrupted.  `first`: ticks from the last request
+    (`Tried.asked`) to the first command that moves the arm; `first_motion`: ticks from that request to the first motion of a joint; -1: not
+    timed.
     """
 
     kind: str
@@ -226,10 +229,10 @@ def _contacts(plant: OfflinePlant, q: Array) -> str:
 
 
 def main() -> None:
-    """Simulate reaches for all targets that can be reached, and print a Markdown table with the best reach for each of them.
+    """Simulate reaches for the thesis' targets that the palm can touch, and print a Markdown table with the best reach for each.
 
-    A row has the number of the target, its position [m], the distance [mm] of the palm from it after the best reach, and the contacts there
-    if the reach missed.
+    A row has the number of the target, its position [m], the distance [mm] of the palm from its surface after the best reach, and the
+    contacts there if this reach missed.
     """
     known, plant = belief(), offline_plant(0)
     lines = ["| target | x | y | z | best reach [mm] | contacts there [mm] |", "| --- | --- | --- | --- | --- | --- |"]
