@@ -46,9 +46,9 @@ def reach_path(
 ) -> ReachPath:
     """Return a path that moves a marker to a target in steps of alpha J^T dx (thesis eq. 5.4, Algorithm 5); contacts are ignored.
 
-    The thesis leaves alpha open. Here it is 1 / (the largest eigenvalue of J J^T + `bend_bound`), so that no step overshoots. Every step
-    ends within the motors' limits. The path ends "stuck" when steps no longer move the marker: the target is out of reach, limits block the
-    motion, or the pose is singular.
+    The thesis leaves alpha open. Here it is 1 / (l + b), so that no step overshoots: l is the largest eigenvalue of J J^T, and b a bound on
+    the curvature of the marker's path (`bend_bound`). Every step ends within the motors' limits. The path ends "stuck" when steps no longer
+    move the marker: the target is out of reach, limits block the motion, or the pose is singular.
 
     Args:
         model: the robot.

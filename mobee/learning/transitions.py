@@ -299,7 +299,7 @@ class TransitionModel(Tabled):
         return self._debiased[goal, stay]
 
     def gain(self, state: int, action: int, outcome: int) -> float:
-        """Return the reward [nats] that a transition from `state` by `action` to the state `outcome` would give now; nothing is changed."""
+        """Return the information gain [nats] of a transition from `state` by `action` to the state `outcome`; the model is not changed."""
         self._check(state, action, outcome)
         if self._runs is not None:
             return self._gain_since_change(int(state), int(action), int(outcome))

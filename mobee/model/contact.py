@@ -103,12 +103,12 @@ class ContactTable:
 
     @property
     def first(self) -> Column:
-        """The first volume of each contact, (c,): the number of a shape, or the number of shapes plus the index of an attached object."""
+        """The index of the first volume of each contact, (c,), in a list of all shapes, then all objects; an object here is attached."""
         return self.numbers[:, 2]
 
     @property
     def second(self) -> Column:
-        """The second volume of each contact, (c,): the number of a shape, or the number of shapes plus the index of a world object."""
+        """The index of the second volume of each contact, (c,), in a list of all shapes of the robot, then all world objects."""
         return self.numbers[:, 3]
 
     @property

@@ -42,7 +42,7 @@ class SolidPairs(Struct, frozen=True, forbid_unknown_fields=True):
     apart: list[list[str]]
 
     def links(self) -> set[frozenset[str]]:
-        """Return the listed pairs of two links of the robot, as sets of two names."""
+        """Return the pairs of the robot's links whose contacts count as solid contacts, as sets of two names."""
         return {frozenset(pair) for pair in self.always + self.apart if TABLE not in pair}
 
     def against_table(self) -> list[str]:

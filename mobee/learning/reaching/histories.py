@@ -53,7 +53,10 @@ class Histories:
         self._sums = np.zeros((4, 2))
 
     def add(self, action: int, target: Array, value: float) -> None:
-        """Append a value to the history of an action; `target`: (3,) m. Raises InvalidValue if there is no such action."""
+        """Record a value, such as a reward, that was observed when an action was tried with a target.
+
+        `target`: position (3,) m, root frame. Raises InvalidValue if there is no such action.
+        """
         if not 0 <= action < self._actions:
             raise InvalidValue(f"action {action!r}: valid are 0 to {self._actions - 1}.")
         key = action, self._index(target)

@@ -111,9 +111,9 @@ SIX = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")  # of a symmetric matrix
 
 
 def read_bodies(tree: Tree, skeleton: Skeleton) -> tuple[Body, ...]:
-    """Return one body with the mass of each link of the robot that has a mass; raises RobotFileError for faulty numbers.
+    """Return the bodies of the robot: one for each link that has a mass. Raises RobotFileError for faulty numbers.
 
-    The masses of links on fixed joints are added to those of the links that carry them.
+    A link on a fixed joint gets no body; its mass is added to the body of the link that carries it.
     """
     return one_a_link(_bodies(tree, skeleton))
 

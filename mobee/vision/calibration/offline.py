@@ -55,7 +55,8 @@ class Watcher:
         model: the robot in its world.
         settings: settings of the cameras.
         errors: by how much the simulated cameras, encoders and tag differ from the model.
-        seed: seed of the noise of encoders, stamps and pictures, of the room, and of the clutter.
+        seed: seed of the noise of the encoders, of the pictures and of the times at which these were taken; also of the furniture and
+            lamps of the room, and of the clutter.
         has_clutter: whether sheets and discs of paper lie on the boxes of the world.
     """
 
@@ -69,9 +70,10 @@ class Watcher:
         self._rng = np.random.default_rng([seed, 0x7374616D70])
 
     def move(self, posture: Array, parts: Sequence[str], rest: float) -> tuple[Motion, float]:
-        """Move the parts to a posture (n,) rad and stay there for `rest` [s].
+        """Move the parts to a posture and stay there for `rest` [s].
 
-        Returns the recorded motion, and the time [s] at which the robot arrived, or at which the time limit of 6 s ended.
+        `posture`: (n,) rad, positions of all motors of the robot; those of other parts are not used. Returns the recorded motion, and the
+        time of the plant [s] at which the robot arrived, or at which the time limit of 6 s ended.
         """
         plant, start, traces = self.plant, self.plant.time, []
         for part in parts:

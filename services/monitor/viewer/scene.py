@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The 3D scene: the robot, its fields, the objects, the trails of the hands, and the poses in which actions ended."""
+"""The 3D scene: robot and objects, fields (volumes that cause repulsive forces), trails of the hands, poses in which actions ended."""
 
 from __future__ import annotations
 
