@@ -32,8 +32,8 @@ def midpoints(space: Space, reaches: Reaches) -> Array:
 
     Row state * A + action belongs to this action of this state. Columns 0 to 2 are the position of the marker (the point of the hand that
     reaches for targets) in units of LENGTH_SCALE (0.08 m), root frame. The last d columns are the positions of the joints; the unit of a
-    joint is JOINT_SCALE (0.4) times the range of its positions in the states (largest minus smallest). For an action that does not exist the goal is the
-    start.
+    joint is JOINT_SCALE (0.4) times the range of its positions in the states (largest minus smallest). For an action that does not exist
+    the goal is the start.
     """
     goals = np.where(space.goals == NO_ACTION, np.arange(len(space))[:, None], space.goals)
     scaled = reaches.samples / np.maximum(np.ptp(reaches.samples, axis=0), 1e-9) / JOINT_SCALE

@@ -98,8 +98,7 @@ class Problem:
 
     Attributes: `model`: the model, with only solid shapes; `terms`: all terms; `by_name`: the same, from name to term; `free` (d,): indices
     of the motors that may move; `limits` (d, 2) rad: their limits, reduced by the margin; `start` (n,) rad: the start pose, moved inside
-    these limits; `must`: whether at least one term has a tolerance; `evaluations`: number of
-    evaluated poses.
+    these limits; `must`: whether at least one term has a tolerance; `evaluations`: number of evaluated poses.
 
     Args:
         model: robot and world.
