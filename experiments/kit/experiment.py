@@ -119,7 +119,7 @@ def in_settings(what: str, rule: Rule, settings: Mapping[str, Any]) -> Measured 
 def _by_setting(envelope: Envelope) -> str:
     """Return in which settings the claim holds and fails, as text."""
     grouped = {word: [name for name, holds in envelope.holds.items() if holds == found] for found, word in _WORDS.items()}
-    each = (f"{word} with {', '.join(_merged(names, list(envelope.holds)))}" for word, names in grouped.items() if names)
+    each = (f"{word} for {', '.join(_merged(names, list(envelope.holds)))}" for word, names in grouped.items() if names)
     return f"{envelope.what}: {'; '.join(each)}"
 
 

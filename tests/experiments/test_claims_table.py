@@ -129,7 +129,7 @@ def test_a_run_without_results_is_refused(tmp_path):
 
 def test_the_text_fits_the_terminal(claim):
     said = claims_text([("exploration-coverage", claim.measured("0.26 [0.22, 0.32]", Envelope("unit", {"1 cm": False})))], 60)
-    assert said.startswith("not reproduced  ") and "ours: 0.26 [0.22, 0.32]" in said and "unit: fails with 1 cm" in said
+    assert said.startswith("not reproduced  ") and "ours: 0.26 [0.22, 0.32]" in said and "unit: fails for 1 cm" in said
     assert all(len(line) <= 60 for line in said.splitlines())
 
 

@@ -164,8 +164,8 @@ def _proportional(groups: Groups) -> Measured:
         f" {', '.join(f'{d:g}' for d in values)}: {of_limit} of mean reward / (1 - discount), to which they are proportional"
     )
     bounds = high / low * (1.0 - ROUGHLY), high / low * (1.0 + ROUGHLY)
-    readings = {"they grow with it": is_above(values[high], values[low])}
-    readings["in proportion to it within one half"] = decides(ratio_interval(values[high], values[low]), *bounds)
+    readings = {"growth with the discount factor": is_above(values[high], values[low])}
+    readings["proportionality within one half"] = decides(ratio_interval(values[high], values[low]), *bounds)
     return text, Envelope("reading", readings)
 
 

@@ -374,11 +374,11 @@ def _falls_short(roadmap: Row, learned: Row) -> bool | None:
 
 
 def _in_wrong_models(rows: Rows, rival: str) -> Measured:
-    """Judge a roadmap under each wrong belief; the text has that with both errors first."""
+    """Judge a roadmap with each wrong model."""
     learned = row_of(rows, "MDP, 4000 learned", "")
     roadmaps = {belief: row_of(rows, rival, belief) for belief in WRONG}
-    each = (f"with {belief} {row.text('hard')}" for belief, row in roadmaps.items())
-    text = f"success in hard queries: PRM, by the error of its model, {', '.join(each)}; MDP after 4000 transitions {learned.text('hard')}"
+    each = (f"{belief} {roadmaps[belief].text('hard')}" for belief in BELIEFS[1:])
+    text = f"success in hard queries: PRM, by the error of its model: {', '.join(each)}; MDP after 4000 transitions {learned.text('hard')}"
     return text, Envelope("error of the model", {belief: _falls_short(row, learned) for belief, row in roadmaps.items()})
 
 

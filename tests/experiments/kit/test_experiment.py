@@ -53,7 +53,7 @@ def test_an_aim_has_its_own_verdicts():
 def test_a_record_is_read_back():
     for measured in (CLAIM.measured("3.1", True), CLAIM.measured("3.1", Envelope("unit", {"1 cm": True, "3 cm": False, "10 cm": False}))):
         assert Claim(**measured.record()) == measured
-    assert measured.settings == "unit: holds with 1 cm; fails with 3 cm, 10 cm" and measured.verdict == "depends"
+    assert measured.settings == "unit: holds for 1 cm; fails for 3 cm, 10 cm" and measured.verdict == "depends"
 
 
 def test_there_is_no_other_verdict():
@@ -93,15 +93,15 @@ def test_the_settings_of_a_claim_are_judged_one_by_one_and_their_text_says_where
     each = Claim("thesis 8", "there are enough runs", "two", rule=enough.rule, varies="unit")
     (found,) = judged([each], {"1 cm": [1, 2], "3 cm": [1], "10 cm": [1, 2, 3]})
     assert (found["verdict"], found["ours"]) == ("depends", "2 runs; with 3 cm: 1 runs")
-    assert found["settings"] == "unit: holds with 1 cm, 10 cm; fails with 3 cm"
+    assert found["settings"] == "unit: holds for 1 cm, 10 cm; fails for 3 cm"
     inner = Claim("thesis 8", "", "", rule=lambda runs: ("", Envelope("gain", runs)), varies="unit")
     (nested,) = judged([inner], {"1": {"a": True, "b": False}, "3": {"a": False, "b": False}})
-    assert nested["settings"] == "unit / gain: holds with 1 / a; fails with 1 / b, 3"
+    assert nested["settings"] == "unit / gain: holds for 1 / a; fails for 1 / b, 3"
     mixed = Claim("thesis 8", "", "", rule=lambda runs: ("", Envelope("gain", runs) if isinstance(runs, dict) else runs), varies="unit")
     (found,) = judged([mixed], {"1": {"a": True, "b": True}, "3": False})
-    assert found["settings"] == "unit / gain: holds with 1; fails with 3"
+    assert found["settings"] == "unit / gain: holds for 1; fails for 3"
     (same,) = judged([inner], {"1": {"a": True, "b": False}, "3": {"a": True, "b": False}})
-    assert same["settings"] == "gain: holds with a; fails with b"
+    assert same["settings"] == "gain: holds for a; fails for b"
 
 
 def test_p_is_the_smallest_rate_at_which_the_intervals_decide_the_same():

@@ -29,14 +29,14 @@ def test_a_strategy_outperforms_with_fewer_evaluations_on_one_task():
     known = runs(nes=1.1, xnes=3.0, snes=3.0)
     known["snes", TASKS[0]] /= 6.0
     better, *_ = judged(CLAIMS, known)
-    assert better["verdict"] == "depends" and "holds with SNES as published" in better["settings"]
+    assert better["verdict"] == "depends" and "holds for SNES as published" in better["settings"]
     assert verdicts(runs(nes=1.1, xnes=3.0, snes=3.0))[0] == "refuted"
     assert verdicts(runs(nes=0.9, xnes=0.9, snes=0.9))[0] == "confirmed"
 
 
 def test_a_strategy_is_comparable_with_few_more_evaluations_on_the_median_task():
     _, comparable, aim = judged(CLAIMS, runs(nes=1.1, xnes=3.0, snes=1.4))
-    assert comparable["verdict"] == "depends" and "fails with xNES as published" in comparable["settings"]
+    assert comparable["verdict"] == "depends" and "fails for xNES as published" in comparable["settings"]
     assert aim["verdict"] == "not met" and verdicts(runs(nes=1.0))[1:] == ["confirmed", "met"]
 
 

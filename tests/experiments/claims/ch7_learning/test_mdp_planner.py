@@ -66,7 +66,7 @@ def test_the_claims_follow_from_the_numbers(done):
     fig7, enters, inoperable, predictable, avoids = judged(CLAIMS, runs_of(done))
     assert [claim["verdict"] for claim in (fig7, enters, inoperable)] == ["confirmed", "confirmed", "depends"]
     assert [claim["verdict"] for claim in (predictable, avoids)] == ["confirmed", "confirmed"]
-    assert inoperable["settings"] == "when a motion fails: holds with planned once; fails with repairs, remembers"
+    assert inoperable["settings"] == "when a motion fails: holds for planned once; fails for repairs, remembers"
     assert "0.50" in inoperable["ours"] and "0.95" in inoperable["ours"]
     assert "0.80" in enters["ours"] and "1000 transitions later" in enters["ours"]
 
