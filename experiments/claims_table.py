@@ -71,8 +71,8 @@ is none; MoBeE must be installed on all of them in the same version. `--quick` r
 ## Terms
 
 **state-action**: one action in one state. **prior 50-50**: before its first try, an action is imagined to fail
-once and to succeed once; **60-40**: to fail once and to succeed twice. **'Kail' divergence**: the information gain with
-which the thesis rewards an action, the KL divergence of the belief after an observation from the belief before it
+once and to succeed once; **60-40**: to fail once and to succeed twice (counts start at 1, so they are 2 and 3, or 40 and
+60 %). **'Kail' divergence**: the information gain with which the thesis rewards an action, the KL divergence of the belief after an observation from the belief before it
 ([learning](../docs/learning.md)). **hypercube**: four motors with two positions each, 16 states with 4 actions each.
 **settle speed**: the speed below which an action counts as ended. **cable force**: the largest force of the constraints
 of the shoulder's cables. **constrained**, **free**: the left arm with its cable constraints and self-contacts, and
