@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Keys of calls and of liveliness tokens, as functions; the keys of streams are in the messages (`Message.stream`).
+"""Keys (names on the message bus) of calls, and of liveliness tokens, which exist as long as a process runs, as functions.
 
-The keys do not contain the robot's name, because it is the namespace of the session.
+The keys of streams are in the messages (`Message.stream`). Keys do not contain the robot's name, because Zenoh, the library of the bus,
+prefixes all keys of a session with it (the namespace).
 """
 
 from __future__ import annotations

@@ -169,8 +169,9 @@ def with_fields(robot: Robot, pairs: Ints, width: float, seed: int, short: float
     `pairs`: (p, 2) indices of shapes, the pairs of solids that fields should keep apart. `width`: m, distance by which fields extend beyond
     the solids. A pair gets fields of the full width, or else of 1/2, 1/4 or 1/8 of it. A width is not used for a pair whose fields would
     overlap at home or in more than FIELD_OFTEN (60 %) of random poses. It is also not used for a pair with short levers, if limits and
-    clauses (conditions on motor positions) can keep the pair apart (see `can_cut`). The lever of a contact is the change of its depth if
-    the motors move by 1 rad; levers are short if their median is below `short` times `Robot.least_lever`. `seed`: seed of the random poses.
+    clauses (conditions on motor positions) can keep the pair apart (see `can_cut`). The lever of a contact is the norm of the
+    derivatives of its depth by the motors; the levers of a pair are short if their median over the random poses in which it has a contact
+    is below `short` times `Robot.least_lever`. `seed`: seed of the random poses.
     """
     for suffix, size in SIZES.items():
         robot, pairs = _with_fields(robot, pairs, size * width, suffix, seed, short)

@@ -48,7 +48,7 @@ def equidistant_goals(digits: Ints, sizes: Sequence[int]) -> Ints:
 
 
 def nearest_goals(points: Array, count: int, tie_seed: int) -> Ints:
-    """Return for each of `points` (S, d) the indices of its `count` nearest other points, ascending, shape (S, count).
+    """Return for each of `points` (S, d) its `count` nearest other points, as indices in ascending order, shape (S, count).
 
     If several points are equally far, but not all of them are among the `count` nearest, a random choice with `tie_seed` decides. Memory
     grows with S times count, and so does time unless many points are equally far.

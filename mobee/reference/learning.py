@@ -80,11 +80,11 @@ def action_values(outcomes: Ints, chances: Array, reward: Array, discount: float
 def value_iteration(
     outcomes: Ints, chances: Array, reward: Array, discount: float = 0.9, tolerance: float = 1e-3, start: Array | None = None
 ) -> tuple[Array, Array]:
-    """Return V (S,) and Q (S, A), computed by sweeps until no Q changes by `tolerance` or more (Algorithm 7).
+    """Return V (S,) and Q (S, A), computed by sweeps until no Q changes by `tolerance` or more (thesis Algorithm 7).
 
     `outcomes` (S, A, B): the states in the B bins of each state-action; `chances` (S, A, B): their probabilities. `reward` (S, A); -inf: no
     such action. `discount`: factor of future rewards, 0 to 1. `start` (S,): first values, None: 0; a state without actions keeps its value.
-    Algorithm 7 as printed compares the change with the tolerance without taking its absolute value. Then the sweeps would end too early
+    The thesis' algorithm compares the change with the tolerance without taking its absolute value. Then the sweeps would end too early
     when values have to decrease.
     """
     values = np.zeros(len(outcomes)) if start is None else start

@@ -42,7 +42,7 @@ class Motion:
         return len(self.poses)
 
     def part(self, first: int, last: int) -> Motion:
-        """Return the motion from pose number `first` to pose number `last`, both included."""
+        """Return the motion from the pose with index `first` to the pose with index `last`, both included."""
         return Motion(self.poses[first : last + 1], self.times[first : last + 1], self.objects[first : last + 1])
 
     def path(self, marker: str) -> Array:

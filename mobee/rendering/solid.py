@@ -62,7 +62,7 @@ class Solid:
     mesh: Mesh | None = None
 
     def extent(self, along: Array) -> float:
-        """Return the distance [m] from the solid's position to its farthest point in the direction `along`, a unit vector (3,)."""
+        """Return the distance [m] from the solid's position to its farthest point along a unit vector (3,), root frame."""
         x, y, z = along @ self.rotation
         if self.kind == "sphere":
             return self.size[0]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Inputs of the control law from outside: user-defined terms, and the constraint forces of the service `model` after a check.
+"""Inputs of the control law from outside: user-defined terms, and the constraint forces that the service `model` publishes.
 
-Constraint forces push the robot away from motor limits and contacts.
+Constraint forces push the robot away from motor limits and contacts. They are checked when they arrive, before the law uses them.
 """
 
 from __future__ import annotations

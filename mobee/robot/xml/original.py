@@ -4,7 +4,7 @@
 The rules are those of the published program (kailfrank/MoBeE, 2014):
 
 - a <motor> whose name was defined before refers to that motor, and its other attributes are ignored;
-- a motor without limits has -1 to 1, a joint without limits -180 to 180 deg; a home outside the limits is the nearest limit;
+- a motor without limits has -1 to 1 deg, a joint without limits -180 to 180 deg; a home outside the limits is the nearest limit;
 - elements inside a <link> or <joint> are placed relative to its start, a marker at the start itself; a marker without a normal has +x;
 - elements inside a <joint> do not turn with it: they belong to the link that carries the joint;
 - a radius of 0 or less makes no volume;

@@ -61,7 +61,8 @@ class Posterior:
         target: (n, 3) m, root frame, target of each pair.
         residual: (n,) average reward of each pair, minus its prior mean.
         count: (n,) number of rewards in each average.
-        scales: (n, n) factors of the covariances between the pairs, see `worlds.scales_of`; those of the present world are 1.
+        scales: (n, n) factors of the covariances between the pairs: above 1 for two pairs that were tried in the same earlier world or on
+            the same other robot (`worlds.scales_of`), else 1.
     """
 
     def __init__(
