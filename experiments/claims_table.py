@@ -70,15 +70,16 @@ is none; MoBeE must be installed on all of them in the same version. `--quick` r
 
 ## Terms
 
-**state-action**: one action in one state. **prior 50-50**: before its first try, an action is imagined to fail
-once and to succeed once; **60-40**: to fail once and to succeed twice (counts start at 1, so they are 2 and 3, or 40 and
-60 %). **'Kail' divergence**: the information gain with which the thesis rewards an action, the KL divergence of the belief after an observation from the belief before it
-([learning](../docs/learning.md)). **hypercube**: four motors with two positions each, 16 states with 4 actions each.
-**settle speed**: the speed below which an action counts as ended. **cable force**: the largest force of the constraints
-of the shoulder's cables. **constrained**, **free**: the left arm with its cable constraints and self-contacts, and
-without both. **ghost**: a table that exerts no force. **P**: the probability that a run of the agent named first is
-better than a run of the other, with ties counted half. In brackets after a verdict: what the publications leave open,
-with the values with which the claim holds, is open, or fails.
+**state-action**: one action in one state. **prior 50-50**: before its first try, an action is imagined to fail once
+and to succeed once; **60-40**: to fail once and to succeed twice (counts start at 1, so they are 2 and 3, or 40 and
+60 %). **'Kail' divergence**: the information gain with which the thesis rewards an action, the KL divergence of the
+belief after an observation from the belief before it ([learning](../docs/learning.md)). **hypercube**: four motors
+with two positions each, 16 states with 4 actions each. **settle speed**: the speed below which an action counts as
+ended. **cable force**: the largest force of the constraints of the shoulder's cables. **constrained**, **free**: the
+left arm with its cable constraints and self-contacts, and without both. **ghost**: a table that exerts no force.
+**P**: the probability that a run of the agent named first is better than a run of the other, with ties counted half.
+In brackets after a verdict: what the publications leave open, with the values with which the claim holds, is open, or
+fails.
 
 An action leads from one state, a posture, to a near one, its neighbour. Where states have 16 neighbours, many other states have the same
 distance, and it is drawn at random which of them become neighbours: the graph. In
