@@ -44,7 +44,7 @@ def encoding_of(cls: type[Struct]) -> str:
 
 
 def type_of(encoding: str) -> str:
-    """Return the name of the message type in an encoding string, such as State; an empty text if the string is not one of this contract."""
+    """Return the name of the message type in an encoding string, such as State; empty unless it begins as in `encoding_of`."""
     return encoding.removeprefix(_PREFIX).partition("/")[0] if encoding.startswith(_PREFIX) else ""
 
 

@@ -71,7 +71,7 @@ class Clock(Message, frozen=True, kw_only=True):
 
 
 class PartStatus(Struct, frozen=True, forbid_unknown_fields=True):
-    """Status of one part in `Tick`: its sampling time, the state of its gate, and the command that its motors follow; as in `State`."""
+    """Status of one part in `Tick`, as in `State`: sampling time, state of its gate (the check of its commands), command in force."""
 
     k: Count  # tick in which the part was sampled
     t: Count  # ns, bus clock, time of the sample
@@ -196,7 +196,10 @@ class Commands(Message, frozen=True, kw_only=True):
 
 
 class Motion(Message, frozen=True, kw_only=True):
-    """State of a part and of its newest action: measured positions, commanded velocity and acceleration, attractor, contacts."""
+    """State of a part and of its newest action: measured positions, commanded velocity and acceleration, goal, contacts.
+
+    The goal is the attractor, the posture to which the spring of the control law pulls the part.
+    """
 
     stream: ClassVar[Stream] = Stream(
         "{part}/motion",
@@ -236,7 +239,10 @@ class Follow(Message, frozen=True, kw_only=True):
 
 
 class Reach(Message, frozen=True, kw_only=True):
-    """State of the newest reach of a part: a force pulls a marker to a target, then the attractor pulls the part back (thesis 8.2)."""
+    """State of the newest reach of a part: a force pulls a marker to a target, then the part returns (thesis 8.2).
+
+    It returns to its attractor, the posture to which the spring of the control law pulls it, unless the reach was requested with `stay`.
+    """
 
     stream: ClassVar[Stream] = Stream(
         "{part}/reach",

@@ -32,7 +32,7 @@ def schemas_of(key: str) -> dict[str, dict[str, Any]]:
 
     The schema of a stream has the name "message"; a call has "request", "reply" and "failure". `key`: a key such as "left_arm/state" or
     "*/state", or one of those that `keys` returns. It may also be the name of a type, such as "State"; the result is then the schema of
-    this type, as "message". Each schema also contains the encoding string of its type.
+    this type, as "message". Each schema also contains the encoding string of its type, which is sent with each message ("encoding").
     """
     if key in _types():
         return {"message": _schema(_types()[key])}

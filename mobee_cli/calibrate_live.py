@@ -85,10 +85,10 @@ class Pictures:
 
 
 def calibrated_live(endpoint: str, marker: str, count: int, seed: int) -> Calibration:
-    """Calibrate the robot of the system at `endpoint` by moving its hand with a tag, and return the calibration.
+    """Calibrate the robot of the system at `endpoint` by moving its hand with an AprilTag, and return the calibration.
 
-    `marker`: marker that carries the tag. `count`: number of postures. `seed`: chooses the postures. Raises UserError if no system runs, or
-    if it sends no pictures.
+    `marker`: name of the marker (point on a link) at the palm with the tag. `count`: number of postures. `seed`: chooses the postures.
+    Raises UserError if no system runs, or if it sends no pictures.
     """
     with connected(endpoint) as session:
         robot, world = _robot_of(session, endpoint)

@@ -80,7 +80,7 @@ def run(arguments: argparse.Namespace) -> int:
 def examine(endpoint: str) -> Iterator[Finding]:
     """Yield the findings one by one; each check is independent of the others.
 
-    `endpoint`: address of the router of a system that may run.
+    `endpoint`: address at which a running system, if there is one, has its router; also the address that a new system would use.
     """
     yield _python()
     yield _cores()

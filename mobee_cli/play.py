@@ -30,7 +30,7 @@ the page is in the table of services; Ctrl-C ends everything. docs/play.md."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options of `mobee play` to the parser: the robot and others."""
+    """Add the arguments of `mobee play`, the robot and the options, to the parser."""
     parser.epilog = _NOTES
     parser.add_argument("robot", nargs="?", default=ICUB, metavar="ROBOT", help="name or file of a robot (default: the iCub at its table)")
     add_urdf_options(parser)

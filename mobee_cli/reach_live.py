@@ -140,9 +140,10 @@ def first_moving_command(commands: list[tuple[float, Array]], begun: float, move
 def live(endpoint: str, choose: Choose, target: Array | str) -> Iterator[Setup]:
     """Set up the robot of the system at `endpoint` for a reach, for the block of a `with` statement.
 
-    If the block ends without an error, the goal of the part is then released, and the target is removed. `choose(robot, position)`:
-    function that returns the hand for a target at `position`, (3,) m; None: not known. `target`: a position (3,) m in the root frame, or
-    the name of an object in the model's world. Raises UserError if no system runs.
+    If the block ends without an error, the goal of the part (the right to set its attractor) is then released, and the target is removed.
+    `choose(robot, position)`: function that returns the hand for a target at `position`, (3,) m in the root frame; `position` is None if it
+    is not known. `target`: a position (3,) m in the root frame, or the name of an object in the model's world. Raises UserError if no
+    system runs.
     """
     with connected(endpoint) as session:
         try:

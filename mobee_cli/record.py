@@ -21,7 +21,7 @@ Ctrl-C. Foxglove and Rerun open the files; `mobee replay` plays them again."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options of `mobee record` to the parser: folder, robot, limits and others."""
+    """Add the options of `mobee record` to the parser: folder, robot, largest size of the files, and others."""
     parser.epilog = _NOTES
     add_endpoint(parser)
     parser.add_argument("--to", type=Path, default=Path("."), metavar="DIR", help="folder of the files (default: the working directory)")

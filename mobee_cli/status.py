@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mobee status`: shows the services, the state of each part's safety gate, and the agents."""
+"""`mobee status`: shows the services, the state of each part's safety gate (it checks the commands to the motors), and the agents."""
 
 from __future__ import annotations
 

@@ -61,9 +61,10 @@ finite.
 class DebiasedCounts(ctypes.Structure):
     """The structure `DebiasedCounts` of core/observations.cpp: outcome probabilities from observed outcomes and a weak prior.
 
-    Imagined counts, which thesis Algorithms 6 and 8 add without an observation, do not enter the probabilities. `probabilities`:
-    (S, A, B), for each state-action the probability of each of B bins; the function `believe` of this module updates them. `prior` (B,):
-    the prior's count of each bin. `total`: the sum of the prior. `at`: address of the structure, which keeps its arrays alive.
+    Imagined counts, which thesis Algorithms 6 and 8 add without an observation, do not enter the probabilities. `probabilities`: (S, A, B),
+    for each state-action the probability of each of B bins (a bin holds one outcome); the function `believe` of this module updates them.
+    `prior` (B,): the prior's count of each bin. `total`: the sum of the prior. `at`: address of the structure, which keeps the arrays
+    alive.
     """
 
     _fields_ = (("probability", ADDRESS), ("prior", ADDRESS), ("sum", REAL))
@@ -127,8 +128,8 @@ _deplete = function("deplete", ADDRESS, ADDRESS, ADDRESS, INTEGER, INTEGER, ADDR
 def expected_gains(table: TransitionTable, counts: Array, totals: Array, tries: Ints, gains: Array) -> None:
     """Replace the `gains` (S, A) of all tried state-actions by the expected information gain of their next try [nats], in place.
 
-    `counts` (S, A, B): the count of each bin's outcome, above 0 for all bins whose probability in `table` is above 0. `totals` (S, A): sums
-    of `counts` over the bins. `tries` (S, A): how often each state-action was tried; gains of untried ones are not changed.
+    `counts` (S, A, B): the count of the outcome of each of the B bins of `table`, above 0 for all bins with a probability above 0. `totals`
+    (S, A): sums of `counts` over the bins. `tries` (S, A): how often each state-action was tried; gains of untried ones are not changed.
     """
     following = _NextCounts(address(counts), address(totals))
     _expected_gains(table.at, ctypes.addressof(following), address(tries), address(gains))
@@ -137,9 +138,10 @@ def expected_gains(table: TransitionTable, counts: Array, totals: Array, tries: 
 def deplete(table: TransitionTable, counts: Array, totals: Array, action_values: Array, state: int, steps: int, gains: Array) -> None:
     """Simulate the next `steps` best actions from a state, each with its most likely outcome, and reduce the gains of these actions.
 
-    `gains` (S, A): the expected information gains [nats] of the next tries. They change in place: each gain is reduced as an observation
-    of that outcome would reduce it. `counts` (S, A, B), `totals` (S, A): the counts of the outcomes, and their sums over the bins.
-    `action_values` (S, A): the best action of a state has the largest value; -inf for an action that the state does not have.
+    `gains` (S, A): the expected information gains [nats] of the next tries. They change in place: each gain is reduced as an observation of
+    that outcome would reduce it. `counts` (S, A, B), `totals` (S, A): the counts of the outcomes in the B bins of `table`, and their sums
+    over the bins. `action_values` (S, A): the best action of a state has the largest value; -inf for an action that the state does not
+    have.
     """
     following = _NextCounts(address(counts), address(totals))
     _deplete(table.at, ctypes.addressof(following), address(action_values), state, steps, address(gains))

@@ -117,9 +117,10 @@ def distances(first: Volumes, second: Volumes) -> Reals:
 
 
 def cut(points: Reals, line: Reals, room: int) -> Reals:
-    """Clip a convex polygon `points` (n, 2) by a half-plane; return the clipped polygon (k, 2), k at most `room`, for tests.
+    """Clip a convex polygon `points` (n, 2) by a half-plane; return the clipped polygon (k, 2). Only tests call this.
 
-    `line` (4,): a point (2 numbers) on the border of the half-plane, and the border's inward normal (2 numbers).
+    `room`: largest number k of returned points; further points are left out. `line` (4,): a point (2 numbers) on the border of the
+    half-plane, and the border's inward normal (2 numbers).
     """
     points, line, out = np.ascontiguousarray(points, float), np.ascontiguousarray(line, float), np.full((room + 8, 2), np.nan)
     if points.ndim != 2 or points.shape[1] != 2 or len(points) == 0 or line.shape != (4,):

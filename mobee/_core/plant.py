@@ -50,9 +50,9 @@ class Motors(ctypes.Structure):
 class Braking(ctypes.Structure):
     """The tables with which the core limits the commands of n motors so that they can always brake before their limits.
 
-    `count`: n. `lower`, `upper`: limits of the positions. `fastest`: largest velocities. `change`: largest changes of the velocity in a
-    tick. `velocity`: commanded velocities. These five are addresses of arrays (n,), which the caller keeps alive. `dt`: duration of a
-    tick [s].
+    `count`: n. `lower`, `upper`: limits of the positions [rad]. `fastest`: largest velocities [rad/s]. `change`: largest changes of the
+    velocity in a tick [rad/s]. `velocity`: commanded velocities [rad/s]. These five are addresses of arrays (n,), which the caller keeps
+    alive. `dt`: duration of a tick [s].
     """
 
     _fields_ = (

@@ -143,9 +143,9 @@ def cast(
 ) -> tuple[Floats, NDArray[np.int32], Floats]:
     """Find the first volume or surface that each ray hits; return three arrays: depths, indices and normals.
 
-    `volumes`: (N,) rows of CONVEX. `surfaces`: (M,) rows of SURFACE. Depths (H, W) m are along the axis ahead, infinite if the ray hits
-    nothing. Indices (H, W): the row of a volume in `volumes`, or the field "number" of a surface; -1: nothing. Normals (H, W, 3) point
-    outward, root frame. With K `chosen` pixels only their rays are computed, and the shapes are (K,), (K,) and (K, 3).
+    `volumes`: (N,) rows of the type CONVEX. `surfaces`: (M,) rows of the type SURFACE. Depths (H, W) m are along the axis ahead, infinite
+    if the ray hits nothing. Indices (H, W): the row of a volume in `volumes`, or the field "number" of a surface; -1: nothing. Normals
+    (H, W, 3) point outward, root frame. With K `chosen` pixels only their rays are computed, and the shapes are (K,), (K,) and (K, 3).
     """
     for table, row, size in ((volumes, CONVEX, _convex_size()), (surfaces, SURFACE, _surface_size())):
         if table.dtype != row or row.itemsize != size:

@@ -104,7 +104,7 @@ class Body(Protocol):
 class Upright:
     """An upright thing as the cameras see it.
 
-    `place`: (2,) m, x and y of its axis, root frame. `radius`, `height`: m. `ground`: height of the surface on which it stands [m].
+    `place`: (2,) m, x and y of its axis, root frame. `radius`, `height`: m. `ground`: z of the surface on which it stands [m], root frame.
     """
 
     place: Array
@@ -129,8 +129,8 @@ def azimuth_beside(place: Array) -> float:
 def beside(grasp: SideGrasp, thing: Upright, azimuth: float, gap: float, above: float, starts: Array | None) -> Array | None:
     """Return the posture (n,) rad with the palm beside a thing, or None if there is none.
 
-    `azimuth`: direction that the palm faces [rad]. `gap`: distance between palm and thing [m]. `above`: by how much the palm is higher than
-    at a grasp [m]. `starts`: (S, n) rad, postures from which inverse kinematics starts; None: those of `grasp`.
+    `azimuth`: direction that the palm faces [rad], see `azimuth_beside`. `gap`: distance between palm and thing [m]. `above`: by how much
+    the palm is higher than at a grasp [m]. `starts`: (S, n) rad, S postures from which inverse kinematics starts; None: those of `grasp`.
     """
     return grasp.posture(palm_beside(thing.place, thing.radius, azimuth, gap, thing.ground + above, grasp.grip), starts)
 
@@ -139,8 +139,9 @@ def beside(grasp: SideGrasp, thing: Upright, azimuth: float, gap: float, above: 
 class PreGrasp:
     """A pre-grasp: a posture with the palm beside a thing, from which the hand moves to the thing.
 
-    `azimuth`: direction that the palm faces [rad]. `away`: (n,) rad, a posture farther from the thing, from which the hand moves straight
-    to the pre-grasp. `posture`: (n,) rad, the pre-grasp. `above`: whether `away` is above the pre-grasp; else it is at the side.
+    `azimuth`: direction that the palm faces [rad], see `azimuth_beside`. `away`: (n,) rad, a posture farther from the thing, from which the
+    hand moves straight to the pre-grasp. `posture`: (n,) rad, the pre-grasp. `above`: whether `away` is above the pre-grasp; else it is at
+    the side.
     """
 
     azimuth: float
@@ -242,7 +243,8 @@ class Picker:
     def close(self, thing: Upright, azimuth: float) -> None:
         """Move the palm from the pre-grasp to the thing, and close the hand.
 
-        `azimuth`: direction that the palm faces [rad]. Raises NoPosture if the robot has no posture with the palm at the thing.
+        `azimuth`: direction that the palm faces [rad], see `azimuth_beside`. Raises NoPosture if the robot has no posture with the palm at
+        the thing.
         """
         here = self._known(thing, azimuth, self.grasp.grip.gap, 0.0)
         there = self.body.q if self._there is None else self._there
@@ -259,7 +261,7 @@ class Picker:
     def lift(self, thing: Upright, azimuth: float) -> None:
         """Lift the thing straight up by 8 cm.
 
-        `azimuth`: direction that the palm faces [rad]. Raises NoPosture if the robot has no posture for this.
+        `azimuth`: direction that the palm faces [rad], see `azimuth_beside`. Raises NoPosture if the robot has no posture for this.
         """
         up = self._held(self._known(thing, azimuth, self.grasp.grip.gap, LIFT))
         self.move(np.stack([self._held(self.body.q), up]), GENTLE)
@@ -268,7 +270,8 @@ class Picker:
     def slipped(self, thing: Upright, centre: Array) -> Array:
         """Return how far a thing has slipped in the hand, (3,) m in the frame of the palm.
 
-        `centre`: (3,) m, root frame, where the cameras see the centre of the thing.
+        This is the displacement of its centre from the place that the centre has when the hand closes around the thing. `thing`: as it was
+        seen before the grasp. `centre`: (3,) m, root frame, where the cameras see the centre of the thing now.
         """
         pose, marker = self.grasp.model.evaluate(self.body.q), self.grasp.marker
         found: Array = pose.rotation(marker).T @ (centre - pose.position(marker)) - self._gripped(thing)

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Paths to a pre-grasp, a pose beside an upright thing: a roadmap of such poses, and new plans after bumps (thesis 4.3.3)."""
+"""Paths to a pre-grasp, a pose beside an upright thing: a roadmap of such poses, and new plans after bumps (thesis 4.3.3).
+
+A bump is an unexpected collision, detected by the torques of the motors.
+"""
 
 from __future__ import annotations
 
@@ -175,11 +178,12 @@ class Approach:
 
 
 def approach(body: Body, picker: Picker, thing: Upright, plan: Planner) -> Approach:
-    """Move the palm to a pre-grasp of a thing along planned paths, with a new plan after each bump.
+    """Move the palm to a pre-grasp of a thing along planned paths, with a new plan after each bump (unexpected collision).
 
-    A new path must move around or over the positions of the palm at earlier bumps; if there is no such path, these positions are discarded.
-    After a bump the pre-grasp is not tried again, and pre-grasps that are reached from above are preferred, because the object that was hit
-    is beside the thing. At most 8 plans are made.
+    `body`: the robot, which follows paths under the control law. `picker`: gives the grasp and the last motion to the pre-grasp. `plan`:
+    the planner of paths. A new path must move around or over the positions of the palm at earlier bumps; if there is no such path, these
+    positions are discarded. After a bump the pre-grasp is not tried again, and pre-grasps that are reached from above are preferred,
+    because the obstacle that was hit is beside the thing. At most 8 plans are made.
     """
     found, model, blocked = Approach(), picker.grasp.model, np.empty((0, 3))
     watch = BumpWatch(model.robot, picker.watched)

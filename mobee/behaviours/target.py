@@ -18,7 +18,7 @@ JUMP = 0.05  # m from where the target was expected: it has jumped, and older pl
 class TargetTrack:
     """Estimates the motion of a target that moves at a constant velocity, or jumps.
 
-    All times [s] are those of one clock; the zero of this clock is arbitrary.
+    All times [s] are those of one clock; the zero of this clock is arbitrary. All positions are in one fixed frame, such as the root frame.
     """
 
     def __init__(self, patience: float = 0.6) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs all checks of a robot."""
+"""Runs all checks of a robot: limits, home, units, contacts, fields, constraints, masses, meshes and names."""
 
 from __future__ import annotations
 

@@ -26,7 +26,10 @@ Touch = tuple[str, str, str]  # first, second, kind
 
 
 class Subject:
-    """A robot that is checked, in `world` or alone (None), with values that several checks use; each is computed at its first use."""
+    """A robot that is checked for faults, with values that several checks use; each value is computed at its first use.
+
+    `world`: the objects around the robot; None: there are no objects.
+    """
 
     def __init__(self, robot: Robot, world: World | None = None) -> None:
         self.robot = robot

@@ -232,7 +232,10 @@ def home_contacts(subject: Subject) -> Iterator[Finding]:
 
 
 def world_contacts(subject: Subject) -> Iterator[Finding]:
-    """Yield one note with the contacts of the robot's solids and fields with objects of the world at home; no finding without a world."""
+    """Yield one note with the contacts of the robot's solids and fields with objects of the world at home; no finding without a world.
+
+    Fields are volumes that cause repulsive forces.
+    """
     if subject.world is None:
         return
     world = subject.world.objects

@@ -153,7 +153,7 @@ class Controller:
 
     @property
     def pushed(self) -> bool:
-        """Whether `push` was called since the last `clear`. Each step projects its forces to the motors, since J depends on the pose."""
+        """Whether `push` was called since the last `clear`. The pushed forces are projected to the motors in each step."""
         return bool(self._pushes)
 
     @property
@@ -162,9 +162,10 @@ class Controller:
         return self._reaches
 
     def client_force(self, q: Array) -> Array:
-        """Return the client's force at q (n,) rad, f_config + f_work of thesis eqs. 5.9 and 5.10, (n,) rad/s^2.
+        """Return the force of the client (the caller of `force` and `push`) at q (n,) rad: f_config + f_work, (n,) rad/s^2.
 
-        f_config is the force given to `force`, and f_work the projected sum of the forces given to `push`, each bounded; 0 without any.
+        f_config (thesis eq. 5.9) is the force given to `force`. f_work (eq. 5.10) is the sum of the forces given to `push`, projected to
+        the motors. Each is bounded, and 0 if no such force was given.
         """
         total = np.zeros(len(q))
         if self._pushes or self.forced:

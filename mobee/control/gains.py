@@ -69,9 +69,9 @@ class Gains:
 
     Attributes:
         law: the variant of the law, which decides how constraints and contacts become forces (see `mobee.reference.forces`).
-        damping: C in 1/s.
-        stiffness: K in 1/s^2.
-        max_spring, max_contact, max_client: largest size of the force of the attractor, of contacts and of a client, rad/s^2.
+        damping: C in 1/s; the damping force is -C dq/dt.
+        stiffness: K in 1/s^2, of the spring that pulls each motor to the attractor (its goal position).
+        max_spring, max_contact, max_client: largest size of the force of the spring, of contacts and of a client, rad/s^2.
         max_limit, max_constraint: force at a limit, or at the boundary of a clause, rad/s^2; the force increases further beyond it. In the
             published law `max_constraint` is the largest force.
         limit_width: width of the zone before each limit, rad.
@@ -138,11 +138,11 @@ class Gains:
         into each other, but their forces stop the links before the solids touch.
 
         The time constant C/K is 0.32 s. The experiment `gain-tuning` chose the numbers, with simulated motors that have lag and delay, and
-        commands up to three ticks old at 100 Hz. With a stiffer contact the robot begins to oscillate; with stronger springs of the
-        attractor its links pass through the fields. The springs of torso and shoulders are weaker, because many motors push a hand
-        together. The contact force on a part is bounded by its norm, 35 rad/s^2. This is more than the norm of the largest spring forces of
-        the seven motors of an arm without its hand, 28 rad/s^2. So the force can rise steeply with the depth of a contact, but
-        cannot grow without limit.
+        commands up to three ticks old at 100 Hz. With a stiffer contact the robot begins to oscillate; with stronger springs, which pull
+        the motors to the attractor (their goal positions), its links pass through the fields. The springs of torso and shoulders are
+        weaker, because many motors push a hand together. The contact force on a part is bounded by its norm, 35 rad/s^2. This is more than
+        the norm of the largest spring forces of the seven motors of an arm without its hand, 28 rad/s^2. So the force can rise steeply with
+        the depth of a contact, but cannot grow without limit.
         """
         return cls(
             law="default",
@@ -195,8 +195,8 @@ class Gains:
         A field is a shape around a link; its contacts cause repulsive forces. The lever of a contact is the change of its depth if the
         motors move by 1 rad. For such robots the force is divided by the squared lever, so that contacts have the same stiffness for all
         levers well above `Robot.least_lever`: contact_gain * LEVER^2 = 450 1/s^2 (LEVER: 0.5 m). The bound of the default gains is tuned
-        for the wide fields of the iCub. With that bound, strong springs of the attractor would press the fields of two links of these other
-        robots into each other.
+        for the wide fields of the iCub. With that bound, strong springs, which pull the motors to their goals, would press the fields of
+        two links of these other robots into each other.
         """
         return replace(cls.default(), max_contact=50.0)
 
@@ -214,7 +214,7 @@ class Gains:
         If several calls match a motor, the last call counts. Values are in the unit of the motor: for a motor that slides, `limit_width` is
         in m and each `max_` in m/s^2. (Such gains that are not changed here are converted from rad to m by the range of the motor.) These
         gains can be set for single motors: damping, stiffness, max_spring, limit_width, max_limit, client_slope, max_client and weight.
-        Clauses and contacts involve several motors and have one set of gains.
+        Clauses (constraints on several joints) and contacts involve several motors and have one set of gains.
         """
         return replace(self, motors=((pattern, tuple(sorted(gains.items()))), *self.motors))
 

@@ -108,9 +108,9 @@ class Reaches:
     def add_forces(self, q: Array, attractor: Array, dt: float, total: Array) -> None:
         """Add the forces of all reaches at the measured q (n,) rad to `total`, in place.
 
-        `attractor`: (n,) rad, q* of the control law; a reach cancels the springs of the attractor for the motors that it moves (not with
-        the gains of 2014). `dt`: time since the last tick [s]. `total`: (n,) rad/s^2, at the call the sum of all other forces; the springs
-        of the attractor and the damping are not in it, because `Law.step` adds them later.
+        `attractor`: (n,) rad, q* of the control law, the posture to which its springs pull the motors; a reach cancels these springs for
+        the motors that it moves (not with the gains of 2014). `dt`: time since the last tick [s]. `total`: (n,) rad/s^2, at the call the
+        sum of all other forces; these springs and the damping are not in it, because `Law.step` adds them later.
         """
         copy = q.copy()
         self._core.add_reaches(self._law.address, self.address, len(self), address(copy), attractor.tobytes(), dt, address(total))

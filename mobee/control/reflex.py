@@ -108,7 +108,10 @@ class Watch:
         self._clauses = [f"{clause.part} clause {i}" for i, clause in enumerate(robot.clauses)]
 
     def check(self, pose: Pose) -> tuple[Violation, ...]:
-        """Return all violations of one pose: first contacts (the deepest first), then limits, then clauses."""
+        """Return all violations of one pose: contacts (the deepest first), then exceeded limits (in the order of the motors), then clauses.
+
+        A clause is a constraint on several joints; clauses that do not hold are in the order of `robot.clauses`.
+        """
         contacts = [Violation("contact", f"{c.first} - {c.second}", float(c.depth)) for c in pose.contacts if c.kind in self._kinds]
         contacts.sort(key=lambda violation: -violation.depth)
         beyond = np.maximum(self._limits[:, 0] - pose.q, pose.q - self._limits[:, 1])
@@ -152,8 +155,9 @@ class Recovery:
 class Counts:
     """Numbers of events since the reflex was created.
 
-    `reflexes`: recoveries begun. `recovered`: recoveries after which control returned to the client. `stuck`: recoveries that failed.
-    `flips`: changes of the unfiltered result of the check (violation or not).
+    `reflexes`: recoveries begun. `recovered`: recoveries after which control returned to the client, the program that commands the
+    robot while the reflex does not. `stuck`: recoveries that failed. `flips`: how often the pose changed between having a violation and
+    having none, before the filter (`Debounce`).
     """
 
     reflexes: int = 0

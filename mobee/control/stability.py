@@ -57,10 +57,11 @@ def require_stable(robot: Robot, gains: Gains, dt: float) -> None:
 def stability_bound(robot: Robot, gains: Gains) -> Bound:
     """Return the largest stable time step for the worst case: all springs have their largest stiffness at the same time.
 
-    The springs are those of the attractor, the limits and all clauses. C is the diagonal damping and K the stiffness of all motors. A step
-    of dt is stable while 4 - 2 dt C - dt^2 K is positive definite. So the largest stable step is 1/s, where s is the largest number for
-    which 4 s^2 - 2 s C - K is singular. Two effects are not included; docs/law.md has numbers for both. Contacts: their stiffness depends
-    on the pose and on their number, and their force is bounded. Delays of commands: their effect depends on the motors.
+    The springs pull the motors to the attractor (the goal position), and push them away from the joint limits and into the region allowed
+    by the clauses (conditions on motor positions). C is the diagonal damping [1/s] and K the stiffness [1/s^2] of all motors. A step of dt
+    is stable while 4 - 2 dt C - dt^2 K is positive definite. So the largest stable step is 1/s, where s is the largest number for which
+    4 s^2 - 2 s C - K is singular. Two effects are not included; docs/law.md has numbers for both. Contacts: their stiffness depends on the
+    pose and on their number, and their force is bounded. Delays of commands: their effect depends on the motors.
     """
     moved = np.flatnonzero(gains.weight(robot.motors) > 0)
     if not len(moved):

@@ -28,7 +28,7 @@ class Chain:
 
 
 def chains(robot: Robot) -> list[Chain]:
-    """Return the chains of joints that can be arms or legs, in the order of the tree.
+    """Return the chains of joints that can be arms or legs, in depth-first order of the tree, branches by index of their joints.
 
     A chain ends at a link without further joints, or at a hand. Where the tree branches, a branch is short if its length is less than HAND
     (0.5) times the length of the chain before it; otherwise it is long. If all branches are short, they are the fingers of a hand, and the

@@ -67,11 +67,14 @@ class EnvPlant(InstantPlant):
 
     @property
     def q(self) -> Array:
-        """The last observed state as positions of the motors "state" and "action" of `DiscreteSpace`, (2,): the state's number, and 0."""
+        """The last observed state as motor positions, (2,): its number, and 0.
+
+        These are the positions of the two motors "state" and "action" by which `DiscreteSpace` represents states and actions.
+        """
         return self.space.target(self._state)
 
     def measure(self, part: str) -> Array:
-        """Return the last observed state as positions of the motors "state" and "action" of `DiscreteSpace`, (2,): its number, and 0.
+        """Return the last observed state as motor positions, (2,): its number, and 0, as in `q`.
 
         `part`: must be `space.part`, else UnknownName is raised.
         """

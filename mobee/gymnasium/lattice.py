@@ -131,11 +131,11 @@ class _Arm:
 class LatticeEnv(Env[Any, Any]):
     """A Gymnasium environment: a part of a robot on a lattice. A step is a whole action, until the part has settled or timed out.
 
-    Observation: the state, the number of a cell of the lattice. Action a sets the attractor to the sample (the lattice point) of the a-th
-    neighbour of the state, neighbours in ascending order. `info["action_mask"]` is 1 for the actions that the present state has; any other
-    action moves nothing and takes no time. A contact, a cable or a limit may stop the part in another state. `info` has the outcome: `q`
-    (n_part,) rad by the encoders, `settled`, `duration` in s, `touched` (names of world objects in contact at the end), and `valid` (False
-    if the state did not have the action).
+    Observation: the state, the number of a cell of the lattice. Action a sets the attractor (the pose to which the controller pulls the
+    part) to the sample (the lattice point) of the a-th neighbour of the state, neighbours in ascending order. `info["action_mask"]` is 1
+    for the actions that the present state has; any other action moves nothing and takes no time. A contact, a cable or a limit may stop the
+    part in another state. `info` has the outcome: `q` (n_part,) rad by the encoders, `settled`, `duration` in s, `touched` (names of world
+    objects in contact at the end), and `valid` (False if the state did not have the action).
 
     `reset` puts the robot at home; with `options={"state": s}` it then moves to that state, but an obstacle may stop it in another one.
 

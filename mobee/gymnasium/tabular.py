@@ -46,7 +46,7 @@ class TabularEnv(Env[Any, Any]):
 
 
 def river_swim_env(length: int = 6, render_mode: None = None) -> TabularEnv:
-    """Return the world of `mobee.learning.tabular.river_swim`, with `length` states, as an environment whose episodes never end.
+    """Return the MDP `mobee.learning.tabular.river_swim`, with `length` states, as an environment whose episodes never end.
 
     Made by its id, `MoBeE/RiverSwim-v0`, it truncates an episode after 200 steps.
     """
@@ -54,7 +54,7 @@ def river_swim_env(length: int = 6, render_mode: None = None) -> TabularEnv:
 
 
 def deep_sea_env(depth: int = 10, render_mode: None = None) -> TabularEnv:
-    """Return the world of `mobee.learning.tabular.deep_sea` as an environment; each episode ends after `depth` steps.
+    """Return the MDP `mobee.learning.tabular.deep_sea` as an environment; each episode ends after `depth` steps.
 
     The last of these steps returns to state 0, the top.
     """

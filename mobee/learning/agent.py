@@ -76,7 +76,10 @@ class CuriousAgent(CuriousLearner):
 
     @property
     def state(self) -> int:
-        """The present state of the part, from the last outcome. At the start and after an interruption, reading it measures the state."""
+        """The present state of the part, according to the last outcome.
+
+        At the start and after an interruption there is no outcome to use; then this property measures the state on the plant.
+        """
         if self._state is None:
             before = None if self.last is None else self.last.s_next
             self._state = self.space.state_after(present_outcome(self.plant, self.part), before)

@@ -110,12 +110,12 @@ def depleting(agent: Explorable, state: int, rng: np.random.Generator) -> Array:
     outcome of an action is certain, the expected gain decreases sooner than the last gain. The gain of an action that was never tried is
     that of an imagined success.
 
-    If the scores of several actions differ by less than 1 % of the largest gain, the first plan is simulated from the present state with
-    the most probable outcome of each action, and the gains of the simulated actions are reduced as if these outcomes were observed. The
-    reduced gains are the rewards of a second plan. The score of each of the several actions is then its expected gain plus the discounted
-    value that the second plan has after it; the other actions get -inf. In the second plan, a state with one untried action has a lower
-    value than a state with sixteen untried actions. Both plans use the agent's beliefs. Raises InvalidValue if the agent's divergence is
-    neither "kail" nor "kl".
+    If the scores of several actions are below the highest score by at most 1 % of the largest gain, the first plan is simulated from the
+    present state with the most probable outcome of each action, and the gains of the simulated actions are reduced as if these outcomes
+    were observed. The reduced gains are the rewards of a second plan. The score of each of the several actions is then its expected gain
+    plus the discounted value that the second plan has after it; the other actions get -inf. In the second plan, a state with one untried
+    action has a lower value than a state with sixteen untried actions. Both plans use the outcome model `agent.beliefs`. Raises
+    InvalidValue if the agent's divergence is neither "kail" nor "kl".
     """
     model, actions = agent.model, len(agent.model.space.actions(state))
     if model.divergence not in DIVERGENCES:

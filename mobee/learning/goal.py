@@ -64,7 +64,8 @@ class External:
 def pursued(space: Space, goal: Goal | None, weight: float | None, explorer: str) -> External | None:
     """Return the external reward of an agent; None if there is no goal.
 
-    `weight`: as in `External`. Raises InvalidValue if the agent's explorer ignores external rewards, or for a weight without a goal.
+    `goal`, `weight`: as in `External`. `explorer`: name of the method by which the agent chooses actions. Raises InvalidValue if this
+    method ignores external rewards, or for a weight without a goal.
     """
     if goal is None:
         if weight is not None:
@@ -75,7 +76,10 @@ def pursued(space: Space, goal: Goal | None, weight: float | None, explorer: str
 
 
 def require_pursuing(explorer: str) -> None:
-    """Raise InvalidValue if the explorer of this name ignores external rewards; only those in PURSUING ("curious") use them."""
+    """Raise InvalidValue if `explorer`, the name of a method of choosing actions, is not in PURSUING: only "curious".
+
+    All other explorers ignore external rewards.
+    """
     if explorer not in PURSUING:
         raise InvalidValue(f"the explorer {explorer!r} ignores a goal: take {' or '.join(map(repr, PURSUING))}, or leave the goal out.")
 

@@ -20,7 +20,7 @@ MAX_COMPARED = 2000  # points up to which comparing all pairs is cheaper than im
 def lattice_strides(sizes: Sequence[int]) -> Ints:
     """Return by how much the number of a lattice state changes for one level of each joint, shape (joints,).
 
-    `sizes`: number of levels of each joint. The first joint changes fastest: [1, L0, L0 L1, ...].
+    `sizes`: number of levels of each joint. The first joint changes fastest: [1, L0, L0 L1, ...] for the sizes [L0, L1, ...].
     """
     return np.cumprod([1, *sizes[:-1]]).astype(np.intp)
 

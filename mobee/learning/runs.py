@@ -41,7 +41,7 @@ class OutcomeRuns:
     The time since this change is the run of the action; it is not known, so each possible run has a probability. If the outcomes of an
     action have changed, the outcomes of its neighbours may have changed too. The neighbours of an action are the other actions with the
     same goal state, and the action from this goal state back to the state of the action. The share of neighbours that change together with
-    an action is learned. If an outcome increases the probability that its action has changed by p, then each neighbour is assumed to have
+    an action is learned. If an outcome increases by p the probability that its action has changed, then each neighbour is assumed to have
     changed with the probability p * share.
 
     Args:

@@ -124,14 +124,17 @@ class TabularPlant(InstantPlant):
 
 
 def ideal(space: Space) -> tuple[Ints, Array]:
-    """Return outcomes and probabilities, each (S, A, 1), of a world in which every action ends in its goal state."""
+    """Return outcomes and probabilities, each (S, A, 1), for a `TabularPlant` on which every action ends in its goal state.
+
+    S: number of states, A: largest number of actions of a state.
+    """
     exists = space.goals != NO_ACTION
     outcomes: Ints = np.where(exists, space.goals, 0)[:, :, None]
     return outcomes, exists[:, :, None].astype(np.float64)
 
 
 class TabularWorld(NamedTuple):
-    """A world as tables, each (S, A, B): the states in which an action may end, their probabilities, and the reward of each outcome.
+    """A world (MDP) as tables, each (S, A, B): the states in which an action may end, their probabilities, and the reward of each outcome.
 
     S: number of states, A: largest number of actions of a state, B: largest number of outcomes of an action.
     """
@@ -142,7 +145,7 @@ class TabularWorld(NamedTuple):
 
     @property
     def mean_reward(self) -> Array:
-        """The expected reward of each action, the sum of probability times reward, shape (S, A)."""
+        """The expected reward of each action in each state, the sum of probability times reward over its outcomes, shape (S, A)."""
         mean: Array = (self.probabilities * self.rewards).sum(axis=-1)
         return mean
 
@@ -189,12 +192,13 @@ def half_space(
     memory: float = 0.15,
     noise: tuple[float, float] = (0.01, 0.06),
 ) -> tuple[Ints, Array]:
-    """Return outcomes and probabilities, each (S, A, B), of a world in which a plane cuts off extreme poses.
+    """Return outcomes and probabilities, each (S, A, B), for a `TabularPlant` on which a plane in joint space cuts off extreme poses.
 
-    This imitates cables that limit the robot's motion. The goal of an action is projected onto the free side of the plane, and shifted
-    towards the start of the action. The action ends in a pose that is normally distributed around this point. With the default plane and
-    three levels of each of the arm's four joints, in the order pitch, roll, yaw, elbow, the plane cuts off the states with low pitch, high
-    roll and high yaw: these are the states number 24, 51 and 78 of the 81 states.
+    S: number of states, A and B: largest number of actions of a state and of outcomes of an action. The plane imitates cables that limit
+    the robot's motion. The goal of an action is projected onto the free side of the plane, and shifted towards the start of the action. The
+    action ends in a pose that is normally distributed around this point. With the default plane and three levels of each of the arm's four
+    joints, in the order pitch, roll, yaw, elbow, the plane cuts off the states with low pitch, high roll and high yaw: these are the states
+    number 24, 51 and 78 of the 81 states.
 
     Args:
         space: a lattice.

@@ -92,7 +92,7 @@ class DebiasedCounts(Tabled):
 
     @property
     def outcomes(self) -> Ints:
-        """The state of each outcome of each action, shape (S, A, B); meaningless where the probability is 0."""
+        """The state of each outcome, shape (S states, A actions, B outcomes); meaningless where the probability is 0."""
         return self._model.outcomes
 
     @property

@@ -31,11 +31,11 @@ class OutcomeModel(Protocol):
 
     @property
     def outcomes(self) -> Ints:
-        """The states in which each action may end, shape (S, A, B); meaningless where the probability is 0."""
+        """The states in which each action may end, shape (S states, A actions, B outcomes); meaningless where the probability is 0."""
 
     @property
     def probabilities(self) -> Array:
-        """The probabilities of the outcomes of each action, shape (S, A, B); all 0 for an action that a state does not have."""
+        """The probability of each outcome, shape (S states, A actions, B outcomes); all 0 for an action that a state does not have."""
 
 
 class Tabled(ABC):
@@ -70,9 +70,9 @@ def value_iteration(
 ) -> tuple[Array, Array]:
     """Compute the values of states V (S,) and of actions Q (S, A) under the best policy, by value iteration (thesis Algorithm 7).
 
-    The sweeps stop when no value changes by the tolerance or more. The change is an absolute value. The thesis prints it without the
-    absolute value; so its sweeps would stop at once when values must decrease (negative rewards, or a start from earlier values after a
-    reward has decreased).
+    The sweeps stop when the absolute change of every value is below the tolerance. Algorithm 7 compares the change without the absolute
+    value; so its sweeps would stop at once when values must decrease (negative rewards, or a start from earlier values after a reward has
+    decreased). S: states, A: largest number of actions of a state.
 
     Args:
         model: the outcomes of the actions; a state without actions keeps its starting value.

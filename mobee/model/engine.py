@@ -31,9 +31,10 @@ def robot_handle(robot: Robot) -> core.Handle:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """A robot in the world of one snapshot, as the compiled core has it; immutable.
+    """A robot and the world in one state, as the compiled core has them; immutable.
 
-    `handle`: handle of the scene in the core. `nothing`: an empty contact table, for all poses without contacts.
+    `snapshot`: the state of the world. `handle`: handle of the scene in the core. `nothing`: an empty contact table, for all poses
+    without contacts.
     """
 
     snapshot: Snapshot
@@ -135,9 +136,10 @@ class Engine:
         return ContactTable(self._shapes, snapshot.names, (numbers, reals))
 
     def scene_of(self, snapshot: Snapshot) -> Scene:
-        """Return the scene of the robot in the world of a snapshot; repeated calls with the same snapshot return the same object.
+        """Return the scene of the robot in the world of a snapshot (an immutable state of the world).
 
-        Raises UnknownName for an object that is attached to a link which the robot does not have.
+        A call with the snapshot of the last call returns the same object. Raises UnknownName for an object that is attached to a
+        link which the robot does not have.
         """
         known = self._scene
         if known is not None and known.snapshot is snapshot:

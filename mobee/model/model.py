@@ -66,9 +66,9 @@ class Model:
         """Return the hand of a marker: the links whose contacts with targets are ignored while the marker reaches; raises UnknownName.
 
         The hand is the marker's link (the link on which the marker is) and all links that this link carries. The fields (volumes that cause
-        repulsive forces) of links nearer to the base, such as the forearm, may be so large that the marker is inside them when the robot is
-        at home. If the marker's part has such links, take the one nearest to the base. Contacts of targets with its fields, and with the
-        fields of all links that it carries, are ignored too.
+        repulsive forces) of links nearer to the base, such as the forearm, may be so large that they contain the marker when the robot is
+        at home. Of the links of the marker's part whose fields contain it, one is nearest to the base. Contacts of targets with the fields
+        of this link, and with the fields of all links that it carries, are ignored too.
         """
         known = self._hand_of.get(marker)
         if known is None:

@@ -46,11 +46,11 @@ class RobotTables:
     (J, 3) m of the axis, root frame, zero pose; `motor` (K, J) indices of the motors that drive the joint, at most K; `scale` (K, J) joint
     angle per motor angle, 0 in unused entries; `offset` (J,) joint angle while the motors are at 0; `travel` (K, J) motion of the joint
     [rad or m] when the motor moves by its unit (1 rad, or a length for a slide, see `mobee.robot.motor_units.motor_units`). Shapes:
-    `volume` (S,) rows of VOLUME; `link` (S,); `name` (S,) index into the robot's shapes, then the carried objects; `field` (S,) whether it
-    is a field, which causes repulsive forces; `meets_world` (S,) whether it is tested against free objects; `cluster` (C + 1,) first shape
-    of each cluster; `tested` (S, S) whether two shapes are tested against each other. Corners: `corner` (V, 3) m, relative to the position
-    of the shape, along its axes; `edge_start` (V + 1,) index in `edge` of the first edge of each corner; `edge`: the corner at the other
-    end, as its index among the corners of the shape.
+    `volume` (S,) of the dtype VOLUME (`mobee.model.volumes`); `link` (S,) index of its link; `name` (S,) index into the robot's shapes,
+    then the carried objects; `field` (S,) whether it is a field, which causes repulsive forces; `meets_world` (S,) whether it is tested
+    against free objects; `cluster` (C + 1,) first shape of each cluster; `tested` (S, S) whether two shapes are tested against each other.
+    Corners: `corner` (V, 3) m, relative to the position of the shape, along its axes; `edge_start` (V + 1,) index in `edge` of the first
+    edge of each corner; `edge`: the corner at the other end, as its index among the corners of the shape.
     """
 
     motors: int
@@ -249,8 +249,9 @@ _CACHE: WeakKeyDictionary[Robot, list[list[int]]] = WeakKeyDictionary()
 def clusters(robot: Robot, rows: Volumes, link: Ints, field: Flags, own: int) -> list[list[int]]:
     """Return the clusters of shapes that share a bounding sphere in the core, each a list of indices of shapes.
 
-    `rows`: (S,) rows of VOLUME. `link`: (S,) link of each shape. `field`: (S,) whether it is a field. `own`: number of the robot's own
-    shapes; the shapes after them are carried objects, each of which is a separate cluster.
+    `rows`: (S,) the shapes, of the dtype VOLUME (`mobee.model.volumes`). `link`: (S,) index of the link of each shape. `field`: (S,)
+    whether it is a field (a shape that causes repulsive forces). `own`: number of the robot's own shapes; the shapes after them are carried
+    objects, each of which is a separate cluster.
     """
     groups = _CACHE.get(robot)  # carried objects change while the robot moves, its own groups never do
     if groups is None:

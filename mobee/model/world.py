@@ -138,10 +138,10 @@ class World:
     def attach(self, name: str, link: str, relative: tuple[ArrayLike, ArrayLike] | None = None) -> None:
         """Attach an object to a link of the robot: it moves with the link, and contacts between the two are ignored.
 
-        `relative`: position (3,) m and rotation (3, 3) of the object in the link's frame, which is the root frame at zero pose. None: the
-        object keeps its place relative to the link in the pose that was last given to `follow`. (`Model.attach` has the pose as an
-        argument.) Raises UnknownName for an unknown object, or for an unknown link if a pose is known. Raises InvalidValue for values that
-        are not valid, or if a pose is needed and none is known.
+        `relative`: position (3,) m and rotation (3, 3) of the object in the link's frame, which coincides with the root frame at zero pose.
+        None: the object keeps its place relative to the link in the pose that was last given to `follow`. (`Model.attach` has the pose as
+        an argument.) Raises UnknownName for an unknown object, or for an unknown link if a pose is known. Raises InvalidValue for values
+        that are not valid, or if a pose is needed and none is known.
         """
         pose = None if relative is None else (valid_position(name, relative[0]), valid_rotation(name, relative[1]))
         with self._lock:

@@ -83,7 +83,7 @@ def joints_to(robot: Robot, link: int) -> list[int]:
 
 
 def joint_column(robot: Robot, frames: Array, j: int, point: Array) -> Array:
-    """Return the column of joint j in the Jacobian (eq. 5.1) of a point that it carries, (6,): velocity, then angular velocity.
+    """Return the column of joint j in the Jacobian (thesis eq. 5.1) of a point that it moves, (6,): linear rows, then angular, root frame.
 
     `frames`: (L, 4, 4), as from `link_frames`. `point`: (3,) m, root frame, in the pose of `frames`.
     """
@@ -95,7 +95,7 @@ def joint_column(robot: Robot, frames: Array, j: int, point: Array) -> Array:
 
 
 def jacobian(robot: Robot, frames: Array, link: int, point: Array) -> Array:
-    """Return the Jacobian J(q) = dx / dq of a point that is fixed to a link (eq. 5.1), (6, n): linear rows, then angular, root frame.
+    """Return the Jacobian J(q) = dx / dq of a point fixed to a link (thesis eq. 5.1), (6, n): linear rows, then angular, root frame.
 
     `frames`: (L, 4, 4), as from `link_frames`. `link`: index. `point`: (3,) m, root frame, in the pose of `frames`.
     """

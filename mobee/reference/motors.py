@@ -134,7 +134,7 @@ def torque_response(s: MotorState, asked: Array, friction: Array, fastest: Array
 
 
 def held(s: MotorState, fastest: Array, change: Array) -> Array:
-    """Return the velocity (n,) rad/s of motors in hold, which brake to rest and then stay at this position; updates `rest`, `resting`.
+    """Return the velocity (n,) rad/s of motors in hold, which brake to rest and then keep their position; updates `rest`, `resting`.
 
     `fastest` (n,) rad/s: the largest velocities. `change` (n,) rad/s: the largest change of the velocity in this substep.
     """
@@ -171,9 +171,9 @@ def substep(robot: Robot, parameters: MotorParameters, s: MotorState, dt: float)
 def encoders(robot: Robot, parameters: MotorParameters, s: MotorState, seed: int, k: int, dt: float) -> Array:
     """Return the encoder values (n,) rad, the positions of the joint sides, at tick k, with white noise that depends on `seed`.
 
-    A tick is one period of the controller, of length dt [s]. The standard deviation of the noise is `parameters.encoder_noise` times
-    `fine_units` for ticks of 20 ms, and proportional to 1 / sqrt(dt) for others, so that the spectral density of the noise does not depend
-    on dt.
+    A tick is one period of the controller, of length dt [s]. The standard deviation of the noise is `parameters.encoder_noise` for
+    ticks of 20 ms, and proportional to 1 / sqrt(dt) for others, so that the spectral density of the noise does not depend on dt. For a
+    motor that slides it is multiplied by a length [m] that counts as 1 rad (`mobee.robot.motor_units.fine_units`).
     """
     strength = parameters.encoder_noise * math.sqrt(NOISE_PERIOD / dt) * fine_units(robot)
     read: Array = s.q + strength * np.array([normal(seed, k, motor) for motor in range(len(s.q))])

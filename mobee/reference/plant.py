@@ -73,7 +73,8 @@ class Plant:
     def act(self, part: str, target: Array) -> bool:
         """Set the part's attractor to `target` (n_part,) rad and run ticks until the part has settled (thesis 6.1).
 
-        Returns True, or False if the part has not settled before the timeout of the settle test.
+        The attractor is the pose to which the spring of the control law pulls the motors. Returns True, or False if the part has not
+        settled before the timeout of the settle test.
         """
         self.attractor[self.robot.part(part).slice] = target
         settle, since = self.gains.settle, 0.0

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The force that pulls a marker to a target with one part or the whole body (thesis 5.1, 8.2).
 
-Published law: J^T f, with f proportional to the distance of the marker. It is saturated (eq. 5.9) like a client's force, the force that the
-program that uses the controller requests. The attractor's spring pulls against it.
+Published law: J^T f, with f proportional to the distance of the marker from the target. It is saturated (eq. 5.9) like a client's force,
+the force that the program that uses the controller requests. The spring that pulls the motors to the attractor (the posture to which the
+controller moves the robot) acts against it.
 
 Default law: J^T control oscillates if the motors execute commands with a delay, because its stiffness depends on the pose: the stiffness is
 J J^T plus, for a far target, a term from the curvature of the marker's path. J^T control also stops in singular poses (thesis 5.1).
@@ -52,8 +53,9 @@ class Reach:
     """A reach in progress: its motors, and the state of the default law from tick to tick.
 
     `motors`: (m,) indices of the motors on which the reach exerts a force. `seen`: (6,) m, the error as `rows` defines it, averaged over
-    time to reduce the encoders' noise. `remaining`: m, the norm of `seen`; `best`: m, the smallest norm so far; `since`: s since then.
-    `escape`: (m,) rad, the last direction out of a singular pose; None: the arm was in no singular pose.
+    time to reduce the encoders' noise. `remaining`: m, the norm of `seen`; `best`: m, the norm at its last decrease that counted
+    (`note_error`); `since`: time [s] since that decrease. `escape`: (m,) unit vector of motor motions, the last direction out of a singular
+    pose; None: no such direction is known.
     """
 
     robot: Robot
@@ -89,10 +91,10 @@ def begin(robot: Robot, gains: Gains, part: str | None, marker: str, target: Rea
 class View:
     """The errors of a reaching marker in a pose, and the derivatives of its position and rotation.
 
-    `error`: (3,) m, from the marker to its goal. `turn`: (3,) n x n*, the axis about which the normal n should turn to the wanted normal
-    n*; for a target that the marker shall face, it is reduced within FACING (2 cm) of the target's centre. `facing`: n . n*. `columns`:
-    (k, 6), velocity and angular velocity of the marker for each of the k joints between base and marker.
-    `drives`: (k, m), motion of these joints when one of the m pulled motors (`Reach.motors`) moves by 1 rad (a slide: by its
+    All vectors are in the root frame. `error`: (3,) m, from the marker to its goal. `turn`: (3,) n x n*, the axis about which the marker's
+    normal n should turn to the wanted normal n*; for a target that the marker shall face, it is reduced within FACING (2 cm) of the
+    target's centre. `facing`: n . n*. `columns`: (k, 6), velocity and angular velocity of the marker for each of the k joints between base
+    and marker. `drives`: (k, m), motion of these joints when one of the m pulled motors (`Reach.motors`) moves by 1 rad (a slide: by its
     `motor_units`).
     """
 
@@ -190,7 +192,7 @@ def drawn(r: Reach, v: View, s: State, dt: float, against: Array) -> tuple[Array
 
 
 def rows(r: Reach, v: View) -> tuple[Array, Array]:
-    """Return the Jacobian (rows, m) and the error (rows,) of the reach, in m: three rows, or six if a normal is wanted.
+    """Return the Jacobian (k, m) and the error (k,) m of the reach for the m pulled motors; k is 3, or 6 if the target asks for a normal.
 
     The last three rows are those of the rotation that turns the marker's normal to the wanted one, multiplied by ARM (0.1 m).
     """
@@ -217,7 +219,7 @@ def motor_mobility(r: Reach, q: Array, slope: Array) -> Array:
     """Return the mobility E of the m pulled motors, (m,): the velocity of each motor per unit of force.
 
     It is the gain `client_slope` (k of eq. 5.8) divided by the gain `damping`. It is 0 for a motor that is in the outer half of a limit
-    zone, where f_lim acts, if the reach would move it towards the limit. `slope` (m,): J^T e, as `slope_at` returns it.
+    zone, where the force at limits f_lim acts, if the reach would move it towards the limit. `slope` (m,): J^T e, as `slope_at` returns it.
     """
     zones = 0.5 * limit_zones(r.robot, r.gains.of_robot("limit_width", r.robot))
     low, high = r.robot.limits.T + zones.T * np.array([[1.0], [-1.0]])
@@ -245,8 +247,9 @@ def pushed(r: Reach, v: View, marker_mobility: Array, pull: Array, mobility: Arr
 def bend_of_path(v: View, push: Array, mobility: Array) -> Array:
     """Return the stiffness that the curvature of the marker's path adds to the reach, (m, m): -E^1/2 (push . d2x/dq2) E^1/2.
 
-    `push` (rows,): the force on the marker. `mobility` (m,): E, from `motor_mobility`. x: the position of the marker. For two joints a and
-    b, a nearer to the base, d2x/(da db) is the cross product of the axis of a and the derivative dx/db.
+    `push` (3,) or (6,): the force on the marker, as `pushed` returns it. `mobility` (m,): E, from `motor_mobility`. x: the position of the
+    marker. For two joints a and b, a nearer to the base, d2x/(da db) is the cross product of the axis of a and the derivative dx/db. If
+    `push` has six components, the last three add a similar term for the rotation.
     """
     count = len(v.columns)
     along = np.zeros((count, count))

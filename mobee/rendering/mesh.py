@@ -28,8 +28,9 @@ REMEDY = 'pip install "mobee[meshes]"'
 class Mesh:
     """Triangles of one colour, with normals for shading.
 
-    `corners`: (v, 3) m. `normals`: (v, 3) of the corners. `triangles`: (t, 3) indices of corners. `middle` (3,) m and `radius` [m]: a
-    sphere that contains all corners. `color`: red, green, blue and opacity, 0 to 1; None: not given.
+    `corners`: (v, 3) m. `normals`: (v, 3), unit vectors at the corners. `triangles`: (t, 3) indices of corners. `middle` (3,) m and
+    `radius` [m]: a sphere that contains all corners. All are in the frame of the mesh. `color`: red, green, blue and opacity, 0 to 1; None:
+    not given.
     """
 
     corners: NDArray[np.float32]
@@ -44,7 +45,8 @@ class Mesh:
 class Piece:
     """Triangles of one colour as they are read from a file.
 
-    `points`: (v, 3) m. `triangles`: (t, 3) indices of points. `color`: red, green, blue and opacity, 0 to 1; None: not given.
+    `points`: (v, 3) m, in the frame of the mesh. `triangles`: (t, 3) indices of points. `color`: red, green, blue and opacity, 0 to 1;
+    None: not given.
     """
 
     points: Array

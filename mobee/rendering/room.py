@@ -21,10 +21,10 @@ EDGE = 0.03  # m, at the edge of a table that stays free
 
 
 def room(seed: int, colors: Sequence[Color] = (RED,)) -> list[Solid]:
-    """Return the solids of a room: walls with pictures on them, and things near the walls, out of the robot's reach.
+    """Return the solids of a room: a floor, three walls with pictures on them, and things near the walls, out of the robot's reach.
 
-    A quarter of the pictures and things have one of `colors` (red, green, blue, 0 to 1), the colours of the objects that are searched.
-    `seed`: seed of the random choices.
+    `colors`: colours (red, green, blue, 0 to 1) of the objects that vision has to find. On average, a quarter of the pictures and things
+    have one of them; a sphere never has one. `seed`: seed of the random choices.
     """
     rng = np.random.default_rng([seed, _STREAM])
     low, high = FLOOR, CEILING
@@ -50,8 +50,8 @@ def room(seed: int, colors: Sequence[Color] = (RED,)) -> list[Solid]:
 def clutter(objects: Iterable[WorldObject], seed: int, colors: Sequence[Color] = (RED,)) -> list[Solid]:
     """Return sheets and discs of paper, 1 mm thick, that lie on the obstacles of kind "box" among the world's `objects`.
 
-    They are only drawn and have no contacts. A quarter of them have one of `colors` (red, green, blue, 0 to 1), the colours of the objects
-    that are searched. `seed`: seed of the random choices.
+    They are only drawn and have no contacts. `colors`: colours (red, green, blue, 0 to 1) of the objects that vision has to find. On
+    average, a quarter of the sheets and discs have one of them. `seed`: seed of the random choices.
     """
     rng = np.random.default_rng([seed, _STREAM, 1])
     solids = []

@@ -102,7 +102,10 @@ def tube(points: Array, radius: float, colors: Sequence[Color], veiled: float = 
 
 
 def object_solids(objects: Mapping[str, WorldObject]) -> list[Solid]:
-    """Return world objects, given by name, as solids in their own colours or those of their roles; ghosts are transparent."""
+    """Return world objects, given by name, as solids in their own colours or those of their roles.
+
+    Objects with the role "ghost" (without contacts, only drawn) are transparent.
+    """
     found = []
     for number, item in enumerate(objects.values()):
         red, green, blue, given = (channel / 255.0 for channel in palette.of_object(item.kind, item.role, item.color))
@@ -114,9 +117,9 @@ def object_solids(objects: Mapping[str, WorldObject]) -> list[Solid]:
 
 
 def trail_solids(points: Array, group: int = TRAIL_GROUP) -> list[Solid]:
-    """Return the path of a marker through points (P, 3) m as solids: a line that is brighter towards its end, and a ball at the end.
+    """Return the path of a marker as solids: a line that is brighter towards its end, and a ball at the end.
 
-    `group`: number that the solids get as `Solid.group`.
+    `points`: (P, 3) m, root frame, positions of the marker. `group`: number that the solids get as `Solid.group`.
     """
     path = _thinned(points)
     shares = np.linspace(0.0, 1.0, max(len(path) - 1, 1))[:, None]

@@ -21,8 +21,8 @@ def nearest(y: Array, spacing: ArrayLike, count: int) -> Ints:
     """Return edges (E, 2) from each of V vertices to the `count` vertices nearest to it.
 
     `y`: (V, m) coordinates of the vertices. `spacing`: the difference in each coordinate that counts as distance 1, (m,), or one number for
-    all: distances are Euclidean in y / spacing. Each edge occurs once, its lower vertex first, and the edges are sorted. Raises
-    InvalidValue if `count` is below 1.
+    all: distances are Euclidean in y / spacing. Each edge occurs once, its lower vertex first; the edges are sorted by the first vertex,
+    then by the second. Raises InvalidValue if `count` is below 1.
     """
     if count < 1:
         raise InvalidValue(f"{count} neighbours: each vertex needs at least 1.")
@@ -45,7 +45,8 @@ def nearest_before(y: Array, spacing: ArrayLike, count: int) -> Ints:
 
     `y`: (V, m) coordinates of the vertices. `spacing`: the difference in each coordinate that counts as distance 1, (m,), or one number for
     all: distances are Euclidean in y / spacing. The graph is connected. With `count` = m, a vertex and these m vertices are the m + 1
-    corners of a simplex (m = 2: a triangle). Each edge occurs once, its lower vertex first, and the edges are sorted.
+    corners of a simplex (m = 2: a triangle). Each edge occurs once, its lower vertex first; the edges are sorted by the first vertex, then
+    by the second.
     """
     places = y / np.asarray(spacing)
     edges = [np.empty((0, 2), dtype=np.intp)]
@@ -72,7 +73,10 @@ def short(q: Array, edges: Ints, longest: float | None) -> Ints:
 
 
 def sorted_edges(pairs: ArrayLike) -> Ints:
-    """Return pairs of vertices (P, 2) as sorted edges (E, 2), the lower vertex first, without repetitions and without loops."""
+    """Return pairs of vertices (P, 2) as edges (E, 2), the lower vertex first, without repetitions and without loops.
+
+    The edges are sorted by the first vertex, then by the second.
+    """
     ordered = np.sort(np.asarray(pairs, dtype=np.intp).reshape(-1, 2), axis=1)
     return np.unique(ordered[ordered[:, 0] < ordered[:, 1]], axis=0)
 

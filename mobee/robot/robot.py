@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The description of a robot: a tree of joints in zero-position form, parts, motors, markers, constraints, shapes, masses."""
+"""The description of a robot: a tree of joints (axes at zero pose, root frame), parts, motors, markers, constraints, shapes, masses."""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Actions and reaches in progress on an offline plant (a robot simulated in one process), and their outcomes.
 
-An action sets the attractor of a part; in a reach a force pulls a marker to a target. Both end when the part has settled or timed out.
+An action sets the attractor of a part (the position to which the control law's spring pulls its motors); in a reach a force pulls a marker
+to a target. Both end when the part has settled or timed out.
 """
 
 from __future__ import annotations
@@ -99,7 +100,8 @@ if TYPE_CHECKING:
 class Reach:
     """The state of one reach, in which a force pulls a marker to the target.
 
-    `name`: name of the marker. `stay`: whether the part stays in the pose in which the force ended, and does not return to its attractor.
+    `name`: name of the marker. `stay`: whether the part stays in the pose in which the force ended; otherwise it returns to its attractor,
+    the position to which the control law's spring pulls its motors.
     `end`, `marker`: at the end of the force, the outcome and the position of the marker (3,) m, root frame; None while the force acts.
     `missing`: distance of the marker from the target at the end of the force [m].
     """
@@ -128,9 +130,9 @@ class ReachesUnderWay:
 
     @property
     def reaching(self) -> tuple[str, ...]:
-        """The names of the markers that a force pulls to the target at present, and the attribute `exempt`, unless it is None.
+        """The names of the markers on whose hands the targets exert no repulsive force at present.
 
-        The targets exert no repulsive force on the hands that carry these markers. A force need not pull the marker `exempt`.
+        They are the markers that a force pulls to the target, and the marker named in the attribute `exempt`, if it is not None.
         """
         drawn = [reach.name for reach in self._under_way.values() if reach.end is None]
         return tuple(dict.fromkeys(drawn if self.exempt is None else [*drawn, self.exempt]))
@@ -202,7 +204,7 @@ class ReachesUnderWay:
         return self._ended[part]
 
     def after(self, part: str) -> Outcome | None:
-        """Return the outcome of the last motion of a reach of the part that has ended; each outcome is returned once, else None.
+        """Return the outcome of the last motion of the part's reach, if the reach has ended and this was not returned before; else None.
 
         The last motion is the return to the attractor, or the pull to the target if the part stays where it is.
         """

@@ -84,7 +84,7 @@ class OfflinePlant:
     It is a Plant (`mobee.plant.Plant`) on which agents can act. With the default `command_age`, a command computed from the encoders of
     tick k moves the motors from tick k + 1 on, as in the live system (processes on a message bus). Several parts may act at once: `begin`
     starts an action, `advance` runs until at least one action has ended, `act` does both for one part. Parts that are not acting are
-    controlled too, and stay at their attractors.
+    controlled too, and stay at their attractors (the positions to which the springs of the control law pull the motors).
 
     Args:
         model: the robot in its world.
@@ -177,7 +177,7 @@ class OfflinePlant:
 
     @property
     def controller(self) -> Controller:
-        """The controller of the robot; attractors and forces may be set between two ticks."""
+        """The controller of the robot; attractors (positions to which springs pull the motors) and forces may be set between ticks."""
         return self._controller
 
     @property
@@ -313,9 +313,9 @@ class OfflinePlant:
     def advance(self) -> list[tuple[str, Outcome]]:
         """Run until at least one acting part has ended; return the names and outcomes of the parts that ended, in the robot's order.
 
-        For a reach that was begun with `stay` False (see `begin_reach`), the outcome is that of the return to the attractor; with `stay`
-        True, that of the motion towards the target. `reached` returns the outcome of the whole reach. Raises InvalidValue if no part is
-        acting.
+        For a reach that was begun with `stay` False (see `begin_reach`), the outcome is that of the return to the attractor (the position
+        to which the part's springs pull it); with `stay` True, that of the motion towards the target. `reached` returns the outcome of the
+        whole reach. Raises InvalidValue if no part is acting.
         """
         return finished(self.advancing())
 
@@ -344,7 +344,10 @@ class OfflinePlant:
         finished(self._ticks_of(1))
 
     def run(self, ticks: int) -> Trace:
-        """Run exactly `ticks` ticks; return the trace, with one row per tick. The end of an action does not stop the run."""
+        """Run exactly `ticks` ticks; return positions, velocities and contact depths, one row per tick, as a `Trace`.
+
+        The end of an action does not stop the run.
+        """
         return finished(self.running(ticks))
 
     def running(self, ticks: int) -> Work[Trace]:

@@ -32,7 +32,7 @@ Work = Generator[int, None, T]
 
 
 def finished(work: Work[T]) -> T:
-    """Run a generator of a plant's work to its end, and the compiled core between its steps; return the return value of the generator.
+    """Run the generator `work` to its end, and run ticks in the compiled core after each of its steps; return the generator's value.
 
     In each step, `work` yields the address of the structure whose ticks the core must run next (`Plant` of core/plant.cpp). Such generators
     come from `OfflinePlant.advancing` and `OfflinePlant.running`.

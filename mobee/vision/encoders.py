@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Estimates the encoders at the time stamp of a picture, from the readings shortly before and after it."""
+"""Estimates the encoder values at the time stamp of a picture, from the readings shortly before and after it."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Readings:
             rows.append((t, q))
 
     def at(self, t: float) -> tuple[Array, Array, int]:
-        """Return the encoders (n,) rad and velocities (n,) rad/s of all motors at time t [s], and the smallest number of readings.
+        """Return the encoder values (n,) rad and velocities (n,) rad/s of all motors at time t [s], and the smallest number of readings.
 
         For each part, the readings within 0.035 s of t are used; the number is that of the part with the fewest of them. Raises
         InvalidValue if a part has fewer than two.
@@ -66,7 +66,7 @@ class Readings:
 
 
 def moment_at(times: Array, readings: Array, t: float, noise: Array) -> Moment:
-    """Return the encoders at time t [s] from readings (m, n) rad at times (m,) s, by a line fitted to the readings within 0.035 s.
+    """Return the encoder values at time t [s] from readings (m, n) rad at times (m,) s, by a line fitted to the readings within 0.035 s.
 
     `noise`: (n,) rad, standard deviation of one reading. Raises InvalidValue if fewer than two readings are within 0.035 s of t.
     """

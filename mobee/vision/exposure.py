@@ -55,8 +55,9 @@ class Sensor:
         return self._settings.exposure * ((np.arange(count) + 0.5) / count - 0.5)
 
     def view(self, sample: int, position: Array, rotation: Array) -> View:
-        """Return the view (the renderer's camera, without distortion) with which sample number `sample`, from 0, is drawn.
+        """Return the view (the renderer's camera, without distortion) with which one sample of the picture is drawn.
 
+        `sample`: number of the sample (one of the renderings of which the picture is the mean), from 0.
         `position` (3,) m and `rotation` (3, 3): those of the camera in the root frame. The columns of the rotation are the directions
         right, down and ahead of the camera.
         """
@@ -64,9 +65,10 @@ class Sensor:
         return View(rotation.T * UPWARDS, np.array([left, -top]), self._scale, self._width, self._height, position)
 
     def pixels(self, sample: int) -> Pixels:
-        """Return which pixel of the sample's `view` each pixel of the picture shows: height * width pixels of the view, row by row.
+        """Return for each pixel of the picture, row by row, the pixel of the sample's `view` that it shows: height * width selected pixels.
 
-        The view has no distortion; the choice of its pixels distorts the picture as the lens does. `sample`: number of the sample, from 0.
+        The view has no distortion; the selection of its pixels distorts the picture as the lens does. `sample`: number of the sample (one
+        of the renderings of which the picture is the mean), from 0.
         """
         return self._pixels[sample]
 
@@ -110,8 +112,9 @@ class Cameras:
     def expose(self, name: str, postures: Sequence[Array]) -> Picture:
         """Return the picture of a camera (height, width, 3), bytes red, green, blue; `name`: name of the camera.
 
-        `postures`: positions of all motors (n,) rad in the simulation, at each of the `moments`. The offsets `errors.encoders` are added to
-        these positions before the robot is drawn. So the picture shows the head at a posture that differs from the simulated one.
+        `postures`: positions of all motors (n,) rad in the simulation, at each of the `moments`. The offsets of the encoders,
+        `errors.encoders` (n,) rad, are added to these positions before the robot is drawn. So the picture shows the head at a posture that
+        differs from the simulated one.
         """
         camera, scene = self._scene.cameras[name], self._scene
         light = np.zeros((self.settings.height * self.settings.width, 3), np.float32)

@@ -65,7 +65,7 @@ class CameraSettings(Settings):
 
     @property
     def deviations(self) -> Mapping[str, float]:
-        """The standard deviation of each kind of error, along each axis; a calibration takes them as those of its prior.
+        """The standard deviation of each kind of error, along each axis; a calibration uses them in its prior.
 
         The keys are "position" [m] and "rotation" [rad] of a camera on its link, "encoder" [rad], "latency" [s], "tag_position" [m] and
         "tag_rotation" [rad].

@@ -24,8 +24,8 @@ AXES = ("x", "y", "z", "turn_x", "turn_y", "turn_z")  # of a mount
 class Rig:
     """The cameras of a robot before calibration; `names` is the order of the parameters that a calibration estimates.
 
-    `cameras`: by name, with their poses in the kinematic model of the robot. `lens`: lens of all cameras. `tag`: the tag on a palm; None:
-    the robot has no tag.
+    `cameras`: by name, with their poses in the kinematic model of the robot. `lens`: lens of all cameras. `tag`: the AprilTag on a
+    palm; None: the robot has no tag.
     """
 
     robot: Robot

@@ -58,8 +58,8 @@ def nearest_to_rays(origins: Array, rays: Array) -> Array:
 def rays_meet(rig: Rig, x: Array, moment: Moment, sighted: Mapping[str, Sighted]) -> Array | None:
     """Return the position (3,) m, root frame, that is nearest to the rays through given pixels of several cameras.
 
-    None if the rays are parallel, or if a pixel has no ray. `x`: (P,) the calibration's parameters. `moment`: encoder values at the
-    time of the pictures. `sighted`: the point in the pictures, by name of the camera.
+    None if the rays are parallel, or if a pixel has no ray (the lens model maps no direction to it). `x`: (P,) the calibration's
+    parameters. `moment`: encoder values at the time of the pictures. `sighted`: the point in the pictures, by name of the camera.
     """
     transforms = link_transforms(rig.robot, rig.posture(x, moment.q, moment.dq))
     frames = {name: camera_frames(rig.cameras[name], transforms, x[rig.where(name)]) for name in sighted}
@@ -76,9 +76,10 @@ def locate(
     uncertainty: Array | None = None,
     jitter: float = 0.0,
 ) -> Place | None:
-    """Return the position of a point from its pixels in two or more pictures with the same time stamp, by least squares.
+    """Return the position (root frame) of a point from its pixels in two or more pictures with the same time stamp, by least squares.
 
-    None if the rays through the pixels are parallel or a pixel has no ray.
+    None if the rays through the pixels are parallel, if a pixel has no ray (the lens model maps no direction to it), or if the iteration
+    reaches a point behind a camera.
 
     Args:
         rig: the robot and its cameras.

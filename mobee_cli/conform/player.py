@@ -32,7 +32,7 @@ OPERATOR = "mobee_conform"
 
 
 class Broken(Exception):
-    """Raised if the robot breaks a rule of the contract. The message says what was observed and what is expected."""
+    """Raised if the robot breaks a rule of the bus contract (docs/hardware.md). The message contains what was observed and expected."""
 
 
 class Player:
@@ -139,7 +139,8 @@ class Player:
     def drive(self, part: str, verb: str, epoch: int | None = None) -> str:
         """Call arm, release or hold (`verb`) for the drive of a part, and return the new state of its gate.
 
-        `epoch`: number of the ownership; None: the number that the last `take` of this part returned.
+        The gate is the check of a part's commands before its motors: after arm the part follows commands, after hold it stands still,
+        release ends the ownership. `epoch`: number of the ownership; None: the number that the last `take` of this part returned.
         """
         epoch = self.epochs[part] if epoch is None else epoch
         return self.call(keys.drive(part, verb), WithEpoch, Driven, epoch=epoch).gate
@@ -176,7 +177,8 @@ class Player:
     def send(self, part: str, mode: Mode, ref: Array, **changed: Any) -> int:
         """Publish one command to a part, and return its sequence number.
 
-        `ref`: (n_part,), rad or rad/s by `mode`. `changed`: fields that differ from those of a valid command, by name.
+        `ref`: (n_part,), positions [rad], velocities [rad/s] or torques [N m] by `mode`. `changed`: fields that differ from those of a
+        valid command, by name.
         """
         whole = np.zeros(len(self.robot.motors))
         whole[self.robot.part(part).slice] = ref

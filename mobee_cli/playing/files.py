@@ -21,7 +21,7 @@ README = "README.md"
 
 @dataclass(frozen=True, slots=True)
 class Files:
-    """The paths of a setup's files, which lie in one folder: NAME.xml, NAME.toml and NAME.sqlite.
+    """The paths of the files of a setup (a robot with its agents), in one folder: NAME.xml, NAME.toml and NAME.sqlite.
 
     `store`: path of NAME.sqlite, the file of the transitions.
     """
@@ -38,12 +38,15 @@ class Files:
 
     @property
     def scenario(self) -> Path:
-        """The path of the scenario in which the agents continue to learn live, beginning with the transitions in `store`."""
+        """The path of the scenario (a TOML file with the services to start).
+
+        In the scenario the agents continue to learn live, beginning with the transitions in `store`.
+        """
         return self.store.with_suffix(".toml")
 
 
 def write_files(setup: Setup, files: Files) -> None:
-    """Write the robot (unless it is a shipped one) and the scenario of a setup to their paths in `files`.
+    """Write the robot (unless it is a shipped one) and the scenario (services to start) of a setup to their paths in `files`.
 
     Raises UserError if a file cannot be written, InvalidValue if the robot has properties that its file cannot express.
     """

@@ -71,7 +71,7 @@ class Learning:
         }
 
     def summary(self) -> str:
-        """Return one line with the number of transitions, the robot's time and the speed."""
+        """Return one line with the number of transitions, the robot's time and the speed (robot's time divided by real time)."""
         speed = self.plant.time / self.seconds if self.seconds else 0.0
         return f"{self.transitions} transitions, {self.plant.time / 60.0:.0f} min of robot time, {speed:.0f} x real time"
 
@@ -112,8 +112,9 @@ def _of_agent(agent: CuriousAgent) -> dict[str, Any]:
 def opened(setup: Setup, robot: Robot, store: Path) -> Iterator[Learning]:
     """Create the agents of a setup on an offline plant, for the block of a `with` statement. Raises MobeeError if this is not possible.
 
-    `robot`: the robot, loaded from the same file or name as in the live system, so that offline and live learning have exactly the same
-    state spaces. `store`: file of the transitions. The agents first learn the transitions that it already contains.
+    An offline plant is a simulated robot in this process. `setup`: the settings of the agents, the world and the gains. `robot`: the robot,
+    loaded from the same file or name as in the live system, so that offline and live learning have exactly the same state spaces. `store`:
+    file of the transitions. The agents first learn the transitions that it already contains.
     """
     world = world_around(setup.world, setup.shipped or store)
     dt = next((tick for tick in TICKS if tick < largest_step(robot, setup.law)), TICKS[-1])

@@ -133,9 +133,9 @@ def edge_summary(trm: Roadmap) -> list[str]:
 def as_json(trm: Roadmap, path: Path) -> dict[str, Any]:
     """Return a description of a roadmap as plain JSON data. `path`: path of the roadmap's file.
 
-    "poses", "edges": how many poses and edges it has. "parts": number of poses of each connected component. The next four are lists with
-    one value for each task coordinate. "names": its name. "spacing": the distance between vertices. "low", "high": its smallest and its
-    largest value over all poses; None without poses. "settings": settings with which the roadmap was built.
+    "poses", "edges": how many poses and edges it has. "parts": number of poses of each connected component, the largest first. "names",
+    "spacing", "low" and "high" are lists with one value for each task coordinate: its name, the distance between vertices, its smallest and
+    its largest value over all poses ("low" and "high" are None without poses). "settings": settings with which the roadmap was built.
     """
     return {
         "map": str(path),

@@ -85,7 +85,8 @@ def run(arguments: argparse.Namespace) -> int:
 def report(trm: Roadmap, path: dict[str, Any], played: Played, gains: Gains, arguments: argparse.Namespace) -> int:
     """Print the result of a motion, draw the motion if the arguments request it, and return the exit code.
 
-    `path`: as returned by `mobee_cli.roadmap.query.find_path`.
+    `trm`: the roadmap. `path`: the planned path, as returned by `mobee_cli.roadmap.query.find_path`. `played`: the motion along it.
+    `gains`: gains of the control law in this motion.
     """
     found = result_of(trm, path, played, arguments.tolerance) | held_off(trm, path, played, gains)
     if arguments.picture is not None:
@@ -103,8 +104,8 @@ def require_free(trm: Roadmap, path: dict[str, Any], anyway: bool) -> None:
 def result_of(trm: Roadmap, path: dict[str, Any], played: Played, tolerance: float) -> dict[str, Any]:
     """Return the result of a motion as plain JSON data; lengths in m, angles in rad, times in s.
 
-    `path`: as returned by `mobee_cli.roadmap.query.find_path`. `tolerance`: largest remaining error of the marker [mm] at which the robot
-    has arrived.
+    `path`: the planned path, as returned by `mobee_cli.roadmap.query.find_path`. `played`: the motion along it. `tolerance`: largest
+    remaining error of the marker [mm] at which the robot has arrived.
 
     Keys of the result: "place": task coordinates of the last vertex of the path. "remaining_error": distance of the roadmap's marker from
     its goal; "markers": the same distance for every marker, by name. "rested": whether the robot came to rest. The next three are largest
@@ -139,7 +140,7 @@ def held_off(trm: Roadmap, path: dict[str, Any], played: Played, gains: Gains) -
 
     Keys of the result: "farthest": name of the motor, one that the path moves. "held_by": "its limit", "a constraint of the robot" or "a
     field in contact" (a field is a volume around a link that causes repulsive forces); None if no such force exceeds 0.5 rad/s^2. `path`:
-    as returned by `mobee_cli.roadmap.query.find_path`.
+    the planned path, as returned by `mobee_cli.roadmap.query.find_path`. `played`: the motion along it, with the `gains`.
     """
     off = np.abs(played.q[-1] - path["poses"][-1]) * (np.ptp(path["poses"], axis=0) > 0.0)
     motor = int(off.argmax())

@@ -107,7 +107,7 @@ class LearnedStream:
         """Publish a `Learned` message if the last one is at least 0.5 s old.
 
         `n`: number of transitions that the agent has observed. `s`: its present state. `numbers`: called only for a message that is
-        published; returns rewards and values of all state-actions, (S, A) each.
+        published; returns rewards and values of all state-actions, (S, A) each: S states with at most A actions each.
         """
         now = time.monotonic()
         if now < self._next:
@@ -157,8 +157,8 @@ class ReachStream:
     def put(self, step: Step, target: ReachTarget, plan: tuple[Array, Array]) -> None:
         """Publish a step of the agent towards the target `target`, and add its transition to the counts.
 
-        `plan`: values V (S,) and Q (S, A + 1) of the plan that chose the step; the last column of Q is the action of reaching. A step that
-        is a reach is not a transition, and is not published as one.
+        `plan`: values V (S,) and Q (S, A + 1) of the plan that chose the step, for S states with at most A actions each; the last column of
+        Q is the action of reaching. A step that is a reach is not a transition, and is not published as one.
         """
         values, action_values = plan
         believed = probability_of(self._seen, step.s, step.a, step.s_next) if step.a != REACH else 0.0

@@ -46,9 +46,10 @@ class Config(BehaviourConfig, frozen=True, kw_only=True):
         self.assist(robot)
 
     def assist(self, robot: Robot) -> Assist:
-        """Return the object that chooses the postures of the part, by the learned rewards of the run `learned` or by manipulability.
+        """Return the object that chooses the postures of the part, by learned rewards or by manipulability.
 
-        Raises MobeeError if the settings do not fit the robot, or the run `learned` cannot be read.
+        The rewards are those of the run of learning in the folder `learned`. If `learned` is empty, manipulability is used. Raises
+        MobeeError if the settings do not fit the robot, or the run cannot be read.
         """
         robot.part(self.arm)
         if self.learned:

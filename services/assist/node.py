@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs the torso assist: chooses a posture of the torso for the target, and moves the torso there."""
+"""Runs the torso assist: chooses the posture of the torso from which an arm reaches a target best, and moves the torso there."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Moves the attractors of several parts together along a path, by the robot's clock."""
+"""Moves the attractors of several parts (the postures to which the controller moves them) together along a path, by the robot's clock."""
 
 from __future__ import annotations
 
@@ -29,7 +29,10 @@ REST_TIMEOUT = 60.0  # s until the parts rest after the motion; the controller e
 
 
 class BusFollower(BusPlant):
-    """A BusPlant that moves several parts together along a path of attractors (postures to which they move). All waits have time limits."""
+    """A `BusPlant` (the live robot as a plant) that moves several parts together along a path of attractors. All waits have time limits.
+
+    An attractor is the posture to which the controller moves a part.
+    """
 
     def __init__(self, service: Service, robot: Robot) -> None:
         super().__init__(service, robot, tuple(robot.parts))
@@ -77,7 +80,9 @@ class BusFollower(BusPlant):
     def follow(
         self, parts: Sequence[str], attractors: Sequence[Array], period: float, progress: Callable[[float], None] = lambda share: None
     ) -> dict[str, Outcome]:
-        """Move the attractors of taken parts along `attractors`, and wait until all these parts rest; return the outcome of each part.
+        """Move the attractors of taken parts along `attractors`, and wait until all these parts rest; return the outcomes by part.
+
+        The attractor of a part is the posture to which the controller moves it.
 
         Args:
             parts: names of parts whose goals were taken with `take`.
@@ -115,7 +120,10 @@ class BusFollower(BusPlant):
         return times - times[:1], np.array([q for _, q in self._seen])
 
     def let_go(self) -> None:
-        """Release the goals of all taken parts; the parts then stay where they are. A goal that this service has lost is ignored."""
+        """Release the goals of all taken parts (the right to set their attractors); the parts then stay where they are.
+
+        A goal that this service no longer owns is ignored.
+        """
         for part in list(self._epochs):
             with suppress(CallFailed):  # lost already, or there is no controller: then the part holds
                 self.release(part)

@@ -112,10 +112,10 @@ class BusPlant:
     def act(self, part: str, target: Array) -> Outcome:
         """Set the part's attractor to `target` (n_part,) rad, and wait until the part has settled or timed out; return the outcome.
 
-        Implements `mobee.plant.Plant.act`. If the controller ends, the action continues as soon as another controller has the part under
-        control. Raises InvalidValue for a target beyond the limits. Raises ActionInterrupted if the part is in hold (it stands still and
-        follows no commands) or has a fault; if robot_sim starts a new run; if no controller can continue the action within 10 s; or if the
-        controller gives the part's goal to another service.
+        The attractor is the posture to which the controller moves the part. Implements `mobee.plant.Plant.act`. If the controller ends, the
+        action continues as soon as another controller has the part under control. Raises InvalidValue for a target beyond the limits.
+        Raises ActionInterrupted if the part is in hold (it stands still and follows no commands) or has a fault; if robot_sim starts a new
+        run; if no controller can continue the action within 10 s; or if the controller gives the part's goal to another service.
         """
         sent = self._perform(part, "goal", Goal, q=[float(x) for x in target])
         return self._outcome(part, sent)
@@ -156,13 +156,13 @@ class BusPlant:
         return self._reaches.objects()
 
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
-        """Pull a marker (a named point on a link) to the presented target by a force; return the outcome.
+        """Pull a marker (a named point on a link) to the target, set by `present` or `present_object`, by a force; return the outcome.
 
-        The force ends when the part has settled or timed out. Then the attractor pulls the part back, or, with `stay`, the part stays where
-        the force ended. Implements `mobee.reach.ReachPlant.reach`. Raises UnknownName for an unknown marker; InvalidValue if no target is
-        presented or the part does not move the marker; ActionInterrupted if the part is in hold (it stands still and follows no commands)
-        or has a fault; if robot_sim starts a new run; if the controller ends; or if the controller gives the part's goal to another
-        service.
+        The force ends when the part has settled or timed out. Then the attractor (the posture to which the controller moves the part) pulls
+        the part back, or, with `stay`, the part stays where the force ended. Implements `mobee.reach.ReachPlant.reach`. Raises UnknownName
+        for an unknown marker; InvalidValue if no target is presented or the part does not move the marker; ActionInterrupted if the part is
+        in hold (it stands still and follows no commands) or has a fault; if robot_sim starts a new run; if the controller ends; or if the
+        controller gives the part's goal to another service.
         """
         self.robot.marker(marker)
         sent = self._perform(part, "reach", ReachFor, marker=marker, stay=stay, **self._reaches.asked())

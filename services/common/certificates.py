@@ -34,7 +34,7 @@ _NAME = re.compile(r"[a-z0-9_]{1,64}")
 
 @dataclass(frozen=True, slots=True)
 class Issued:
-    """What the certificate of an identity says: its name, its party (role on the bus; None: the router), and until when it is valid."""
+    """The content of an identity's certificate: its name, its party (role on the bus; None: the router), and the time of its expiry."""
 
     name: str
     party: Party | None
@@ -46,17 +46,20 @@ class Issued:
 
 
 class KeyFolder:
-    """A folder with the certificate of an authority, and with keys and certificates of identities; the authority's key may be elsewhere."""
+    """A folder with the certificate of a certificate authority, and with a private key and a certificate for each identity.
+
+    An identity is a service, the router, or a kind of client. The private key of the authority may be in another place.
+    """
 
     def __init__(self, path: Path) -> None:
         self.path = path
 
     @classmethod
     def new(cls, path: Path, identities: Iterable[tuple[str, Party | None]], days: int = DAYS) -> KeyFolder:
-        """Make an authority, and a key and a certificate for each identity, in a new or empty folder; return the folder.
+        """Make a certificate authority, and a key and a certificate for each identity, in a new or empty folder; return the folder.
 
-        `identities`: pairs of name and party, with the party None for the router. `days`: number of days for which their certificates are
-        valid. Raises BadKeys if the folder contains files, OSError if it cannot be written.
+        `identities`: pairs of name and party (role on the bus; None: the router). `days`: number of days for which the certificates of the
+        identities are valid. Raises BadKeys if the folder contains files, or if a name is not valid; OSError if it cannot be written.
         """
         if path.exists() and any(path.iterdir()):
             raise BadKeys(
@@ -81,7 +84,7 @@ class KeyFolder:
     def add(self, identities: Iterable[tuple[str, Party | None]], days: int = DAYS) -> None:
         """Make a key and a certificate for each identity, or replace old ones.
 
-        `identities`: pairs of name and party, with the party None for the router. `days`: number of days for which the certificates are
+        `identities`: pairs of name and party (role on the bus; None: the router). `days`: number of days for which the certificates are
         valid. Raises BadKeys if a name is not valid, or if the key of the authority is missing; OSError if a file cannot be written.
         """
         authority, key = self._authority(), self._authority_key()
@@ -101,9 +104,10 @@ class KeyFolder:
             _write(identity.certificate, built.sign(key, hashes.SHA256()).public_bytes(Encoding.PEM))
 
     def issued(self) -> list[Issued]:
-        """Return what the certificates of all identities say, sorted by name.
+        """Return name, party and time of expiry of the certificate of every identity, sorted by name.
 
-        Raises BadKeys for a certificate that cannot be read or is of another authority.
+        Raises BadKeys for a certificate that cannot be read, is of another authority, or has another name than its file, and for a folder
+        that is missing or can be read by other users.
         """
         require_private(self.path)
         authority = self._authority()

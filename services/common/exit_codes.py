@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Exit codes of the processes: services, the launcher and the verbs of `mobee`."""
+"""Exit codes of the processes: services, the launcher and the subcommands of `mobee`."""
 
 from __future__ import annotations
 

@@ -26,6 +26,7 @@ RETRY_PERIOD = 0.5  # s of real time between two attempts to take the part
 class FollowedPart:
     """Requests and releases the goal of one part for a behaviour, moves the part, and keeps the newest `Motion` message of every part.
 
+    A `Motion` message is the controller's report about a part: positions, commanded velocity, attractor, and the owner of the goal.
     The goal of a part is the right to set its attractor (the posture to which the controller moves the part). The controller gives this
     right to one service at a time. No method waits for an answer.
     """
@@ -68,9 +69,9 @@ class FollowedPart:
     def take(self) -> None:
         """Ask the controller for the goal of the part (the right to set its attractor), at most once per RETRY_PERIOD (0.5 s).
 
-        The call is not made while the goal belongs to a service that is not a behaviour (assist or gaze). If it belongs to the other
-        behaviour, the controller gives it to this service only if this service has the higher rank (services/controller/precedence.py).
-        `is_owned` becomes True when this service has got the goal.
+        The behaviours are the services `assist` and `gaze`. The call is not made while the goal belongs to any other service. If it belongs
+        to the other behaviour, the controller gives it to this service only if this service has the higher rank
+        (services/controller/precedence.py). `is_owned` becomes True when this service has got the goal.
         """
         now, motion = time.monotonic(), self._motions.get(self._part)
         if motion is None or motion.owner not in ("", self._service.who, *BEHAVIOURS):
@@ -86,11 +87,14 @@ class FollowedPart:
         self._service.ask(keys.goal(self._part, "release"), Done, self._released, request=WithEpoch, epoch=epoch)
 
     def move(self, q: Array, velocity: Array) -> None:
-        """Set the attractor of the part to q (n_part,) rad, moving with `velocity` (n_part,) rad/s; q is clipped to the motors' limits."""
+        """Set the attractor (posture to which the controller moves the part) to q (n_part,) rad, moving with `velocity` (n_part,) rad/s.
+
+        q is clipped to the motors' limits.
+        """
         self._stream.put(epoch=self._epoch, q=np.clip(q, self._low, self._high).tolist(), dq=velocity.tolist())
 
     def forget(self) -> None:
-        """Drop the stored `Motion` messages of the controller; call this at the start of a run."""
+        """Drop the stored `Motion` messages (the controller's reports about the parts); call this at the start of a run."""
         self._motions.clear()
 
     def _note_motion(self, part: str, motion: Motion) -> None:

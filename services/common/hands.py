@@ -45,7 +45,7 @@ def end_markers(robot: Robot) -> tuple[str, ...]:
     """Return the names of the markers on links without child links, without the markers that no motor moves.
 
     If none is left, return all markers that a motor moves. The names are sorted by the number of motors that move the marker, the largest
-    number first: a hand comes before a wheel.
+    number first (a hand comes before a wheel); equal ones are in the order of the robot's file.
     """
     inner = {joint.parent for joint in robot.joints}
     links = frozenset[int]().union(*links_moved(robot).values())
@@ -69,9 +69,9 @@ def part_of(robot: Robot, marker: str) -> str:
 def hand_for(robot: Robot, place: Array | None) -> str:
     """Return the name of the marker with which to reach for a place: the candidate that is nearest to it in the robot's home posture.
 
-    The candidates are the two palms, the right one first. For a robot without both palms, they are the first of its `end_markers` and those
-    that equally many motors move. `place`: (3,) m, root frame; None: not known. If several are equally near, or the place is not known, the
-    first of these candidates is returned. Raises InvalidValue if no motor of the robot moves a marker.
+    The candidates are the two palms, the right one first. For a robot without both palms, they are those of its `end_markers` that the
+    largest number of motors moves. `place`: (3,) m, root frame; None: not known. If several are equally near (within 1 mm), or the place is
+    not known, the first of these candidates is returned. Raises InvalidValue if no motor of the robot moves a marker.
     """
     ends = end_markers(robot)
     if not ends:

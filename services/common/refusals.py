@@ -56,7 +56,10 @@ _SAID = {
 
 @dataclass(frozen=True, slots=True)
 class Refusal:
-    """A description of something that the router refused. Two refusals with the same text are equal, so that they can be counted."""
+    """A description of a message or connection that the secured router refused.
+
+    Two refusals with the same text are equal, so that they can be counted.
+    """
 
     text: str
 

@@ -254,8 +254,8 @@ class Service(Listener):
     def check_router(self) -> None:
         """Raise SystemExit if this service has been without a router, or without its own launcher, for ORPHANED (10 s).
 
-        SystemExit is also raised after a signal whose exception was lost. `run` calls this every second; a loop that does not use `run`
-        must call it too.
+        SystemExit is also raised if the handler of an earlier SIGTERM or SIGINT raised it, but other code caught or ignored it. `run`
+        calls this every second; a loop that does not use `run` must call it too.
         """
         if self._signalled:
             raise SystemExit(OK)

@@ -164,10 +164,10 @@ def local_endpoint() -> Iterator[str]:
 def open_client(endpoint: str, patience: float = 10.0, namespace: str = NAMESPACE, lease: float = LEASE) -> zenoh.Session:
     """Open a session with the router at `endpoint`, trying for `patience` seconds; raises BusUnreachable.
 
-    `namespace`: prefix of all keys: "icub" for the robot itself, or the prefix under which the clients of the port filter find the robot.
-    `lease`: time [s] without a message after which this process counts as dead. If the environment variable MOBEE_KEYS is set, the
-    connection is secured with the identity of this process (`Identity.of_environment`). Raises BadKeys if its keys are missing, or if other
-    users can read them.
+    `namespace`: prefix of all keys: "icub" for the robot itself, or the prefix under which the port filter (MoBeE 1.0, a service between
+    other programs and the robot) serves its clients. `lease`: time [s] without a message after which this process counts as dead. If the
+    environment variable MOBEE_KEYS is set, the connection is secured with the identity of this process (`Identity.of_environment`). Raises
+    BadKeys if its keys are missing, or if other users can read them.
     """
     identity = Identity.of_environment()
     place = endpoint if identity is None else secured(endpoint)

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Answers the calls of agents: take, release and set a part's goal, apply a force, reach; and moves attractors by `Follow` messages."""
+"""Answers the calls of agents: take, release and set a part's goal, apply a force, reach.
+
+It also moves attractors (the postures to which the controller moves the parts) by `Follow` messages.
+"""
 
 from __future__ import annotations
 
@@ -39,8 +42,8 @@ def _by_part(handler: Callable[[str, _Q], Reply]) -> Callable[[_Q, str], Reply]:
 class GoalServer:
     """Answers calls about the goals of all parts: take, release, goal, force and reach.
 
-    The goal of a part is the right to set its attractor. Each new owner of a goal gets a new epoch, a number that its later calls must
-    contain. The ownership ends when the owner's liveliness token disappears.
+    The goal of a part is the right to set its attractor, the posture to which the controller moves it. Each new owner of a goal gets a new
+    epoch, a number that its later calls must contain. The ownership ends when the owner's liveliness token disappears.
     """
 
     def __init__(

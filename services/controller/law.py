@@ -29,7 +29,8 @@ WARM_UP_TICK = 0.01  # s
 class RobotLaw:
     """Keeps the state of the control law and all its inputs: measured positions, forces of model and clients, attractors, reaches.
 
-    The other objects of the controller change the law only by these methods.
+    The attractor of a part is the posture to which the springs of the control law pull it. The other objects of the controller change the
+    law only by these methods.
     """
 
     def __init__(self, bus: Bus, config: Config, robot: Robot) -> None:
@@ -116,13 +117,16 @@ class RobotLaw:
     # One part
 
     def rest(self, part: str) -> None:
-        """Set a part that does not follow the control law to rest: commanded velocity 0, attractor at the measured position."""
+        """Set a part that does not follow the control law to rest: commanded velocity 0, attractor at the measured position.
+
+        The attractor is the posture to which the springs of the control law pull the part.
+        """
         self._law.rest(part, self.q[self._where[part]])
 
     def brake(self, part: str) -> None:
         """Stop a part that has no owner: it brakes and stays, or moves to the posture in the settings, if there is one.
 
-        Nothing happens before the first step of a run.
+        The owner is the service that may set the part's attractor. Nothing happens before the first step of a run.
         """
         if self._last_k >= 0:
             self._law.hold(part, self.q[self._where[part]])
@@ -130,18 +134,19 @@ class RobotLaw:
             self.seek_posture(part)
 
     def seek_posture(self, part: str) -> None:
-        """Set the attractor of a part without owner to the posture in the settings, if there is one."""
+        """Set the attractor of a part that no service owns to the part's posture in the settings, if there is one."""
         if part in self._config.posture:
             self._law.set_attractor(part, np.array(self._config.posture[part]))
 
     def set_attractor(self, part: str, target: Array) -> None:
-        """Set the attractor of the part to `target` (n_part,) rad."""
+        """Set the attractor of the part, the posture to which the springs of the control law pull it, to `target` (n_part,) rad."""
         self._law.set_attractor(part, target)
 
     def follow(self, part: str, target: Array, velocity: Array) -> None:
         """Set the attractor of the part to `target` (n_part,) rad, which moves with `velocity` (n_part,) rad/s.
 
-        If it is not called again within 0.1 s of the control law's time, the attractor counts as not moving (velocity 0).
+        The attractor is the posture to which the springs of the control law pull the part. If this method is not called again within
+        0.1 s of the control law's time, the attractor counts as not moving (velocity 0).
         """
         self._law.follow(part, target, velocity)
 

@@ -33,7 +33,8 @@ class Bumped(Exception):
 class BusBody(BusFollower):
     """The running robot as a `mobee.behaviours.pick.Body`: moves the parts `parts` along paths, by their attractors.
 
-    `gains`: the gains of the running controller's law. `require_seen`: called before every step; it raises an error to end the motion.
+    `gains`: the gains of the running controller's law. `require_seen`: called before attractors are set, and after
+    each wait; it raises an error to end the motion, for example if the cup was not seen for too long.
     """
 
     def __init__(self, service: Service, robot: Robot, parts: Sequence[str], gains: Gains, require_seen: Callable[[], None]) -> None:

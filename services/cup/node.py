@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Fetches the cup: plans motions of hand and arm, step by step, from the places that vision finds; pauses after an error."""
+"""Fetches a cup or another object: plans motions of hand and arm stepwise, from positions found by vision; pauses after an error."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class CupNode:
         self._map = pre_grasp_map(self._grasp, self._ground)
 
     def run(self) -> None:
-        """Fetch the thing and put it down elsewhere, until this has succeeded `config.times` times; try again after an error."""
+        """Fetch the object `config.target` and put it down elsewhere, until `config.times` times have succeeded; retry after an error."""
         self._service.ready()
         while self._done < self._config.times:
             try:

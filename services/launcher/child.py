@@ -92,10 +92,11 @@ class Child:
 
     Times are monotonic, in s. `phase`: waiting (for other services), starting, ready, failed (to be restarted), fault (given up) or ended.
     `since`: time of the last change of phase. `failures`: times of recent failures. `again_at`: time of the next start. `has_token`:
-    whether the process has its liveliness token on the bus. `asked_at`, `answered_at`: times of the last `stat` call and the last answer.
-    `asking`: a call waits for its answer. `unanswered`: number of calls in a row without an answer. `stat`: last answer of the present
-    process. `standby`: process that replaces the present process when this one fails. `has_prepared`: whether the start of a standby
-    process was tried since the present process was started. `reason`: reason of the last failure. `host`: always empty.
+    whether the process has its liveliness token on the bus. `asked_at`, `answered_at`: times of the last `stat` call (request for the
+    service's status) and of the last answer. `asking`: a call waits for its answer. `unanswered`: number of calls in a row without an
+    answer. `stat`: last answer of the present process. `standby`: process that replaces the present process when this one fails.
+    `has_prepared`: whether the start of a standby process was tried since the present process was started. `reason`: reason of the last
+    failure. `host`: always empty.
 
     While the service does not answer `stat` calls, it is asked by `pulse` calls how many messages it has handled. `handled`: the last
     answer. `advanced_at`: time at which this number was last seen to grow. `starvation`: measures how long the service and the launcher
@@ -146,8 +147,8 @@ class Child:
         """Start the process, or use the standby process if there is one.
 
         The process imports its packages and reads its robot, then waits for `release` before it joins the system. `launcher`: value of the
-        environment variable HELD: id of the router that the process may join and, on a host that has joined, the process id of the
-        launcher. Raises OSError if the operating system refuses to start the process.
+        environment variable HELD: id of the router that the process may join and, if this host has joined the system of another host, the
+        process id of the launcher. Raises OSError if the operating system refuses to start the process.
         """
         if self.standby is not None and self.standby.poll() is not None:
             self.dismiss()
@@ -193,8 +194,8 @@ class Child:
         """Record that the service is silent, and start to measure how long it and the launcher wait for a processor.
 
         A service is silent from the time at which a `stat` call has waited too long for its answer (0.2 s) until it answers one.
-        `silence` subtracts this time, so that a service on a busy machine does not count as frozen. The measurement begins at the monotonic
-        time `now` [s] and ends at the next answer.
+        `silence` subtracts the measured waiting time, so that a service on a busy machine does not count as frozen. The measurement begins
+        at the monotonic time `now` [s] and ends at the next answer.
         """
         self.starvation = Starvation((self.pid, os.getpid()), now)
 
@@ -226,7 +227,7 @@ class Child:
         self.enter("starting")
 
     def exit_code(self) -> int | None:
-        """Return the exit code of the process; None while it runs, or if there is none."""
+        """Return the exit code of the process; None while it runs, or if no process was started."""
         return None if self.process is None else self.process.poll()
 
     def running(self) -> bool:

@@ -66,7 +66,7 @@ def name_of(host: str) -> str:
 def check_names(option: str, names: Iterable[str], scenario: Scenario) -> None:
     """Raise ConfigError for the first of the `names` that is not a service of the scenario.
 
-    `option`: the option that gave them, for the message.
+    `option`: the command-line option that gave the names, for the error message.
     """
     known = [part.who for part in scenario.parts]
     for name in names:
@@ -117,8 +117,8 @@ def _digest(path: Path) -> str:
 def request_agreement(session: Session, who: str, endpoint: str) -> Agreement:
     """Ask the first launcher for its version and settings, which the launcher of this host must share; return them as an `Agreement`.
 
-    `endpoint`: address of the first launcher's router, for messages. `who`: name of this launcher. Raises JoinRefused if the first launcher
-    does not answer, or has another version.
+    `endpoint`: address of the first launcher's router, for error messages. `who`: name of this launcher. Raises JoinRefused if the first
+    launcher does not answer, or has another version.
     """
     give_up = time.monotonic() + _PATIENCE
     while LAUNCHER not in alive(session) and time.monotonic() < give_up:
@@ -142,7 +142,7 @@ def check_agreement(first: Agreement, own: Agreement, only: Collection[str], end
 
     It does not fit if the versions or the settings differ, or if one of the services `only`, which this host wants to start, is not in the
     scenario of the first host or is started by the first host itself. `first`, `own`: the agreements of the first host and of this host.
-    `endpoint`: address of the first host, for the message.
+    `endpoint`: address of the first host, for the error message.
     """
     if first.version != own.version:
         raise JoinRefused(f"MoBeE is {own.version} here and {first.version} at {endpoint}: install the same version on both hosts")
@@ -177,7 +177,7 @@ def check_free(session: Session, who: str, only: Collection[str], endpoint: str)
     """Raise JoinRefused if a launcher with the name of this one, or a service that this host wants to start, is already on the bus.
 
     `who`: name of this launcher. `only`: names of the services that this host wants to start. `endpoint`: address of the router, for the
-    message.
+    error message.
     """
     present = alive(session)
     for name in (who, *only):

@@ -74,7 +74,7 @@ class Remote:
 class Remotes:
     """Observes all services of other hosts by their liveliness tokens and their answers to `stat` calls.
 
-    `services`: the state of each service, by name. All its work is done in the main thread, by handlers of the launcher's `service`.
+    `services`: the state of each service, by name. All checks run in the main thread, as callbacks of the launcher's bus (`Service`).
     """
 
     def __init__(

@@ -24,8 +24,8 @@ _PACKAGES = ("mobee", "eclipse-zenoh", "msgspec", "numpy", "pybullet", "mujoco-c
 def make_run_directory(runs: Path, scenario: Scenario, endpoint: str) -> Path:
     """Create the folder `runs/<time>-<name>/` of a run, and return its path.
 
-    It contains scenario.toml, versions.toml, the settings of each service (<who>.toml), and the folder logs/. `endpoint`: address of the
-    router, written into the settings. Raises OSError if it cannot be written.
+    It contains scenario.toml, versions.toml, the settings of each service (<name of the service>.toml), and the folder logs/. `endpoint`:
+    address of the router, written into the settings. Raises OSError if it cannot be written.
     """
     directory = _new_folder(runs, f"{time.strftime('%Y%m%d-%H%M%S')}-{scenario.name}")
     (directory / "logs").mkdir()

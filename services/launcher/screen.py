@@ -36,8 +36,8 @@ class Screen:
     def draw(self, children: Collection[Watched], directory: Path, *, last: bool = False) -> None:
         """Draw the screen over the previous one.
 
-        `children`: services. `directory`: folder of the run. `last`: no further drawing follows. If the output is not a terminal, nothing
-        is drawn.
+        `children`: the services, with their states. `directory`: folder of the run. `last`: no further drawing follows. If the output is
+        not a terminal, nothing is drawn.
         """
         if not self._terminal:
             return

@@ -15,12 +15,13 @@ def summarise(children: Iterable[Watched]) -> dict[str, Any]:
     """Return the measurements of a run by name, as JSON data; None for a number that was not measured.
 
     "agents": for the agent of each part, the counts of transitions, timeouts and interruptions, and the mean time of an action.
-    "hold_ticks": number of ticks in which a part was in hold (stood still, followed no commands). Names with "contact_ticks": number of
-    ticks with such a contact. "missed_ticks": number of skipped ticks. "pairs_watched": number of pairs of bodies that are tested for
-    contact. "rejected_commands": number of refused commands, by reason. "command_age_ticks": percentiles of the age of commands.
-    "lockstep": for a run in lockstep (every tick waits for all participants), the number of ticks, the speed (times real time), whether
-    the run is repeatable, and the hash of its states. "restarts": number of restarts of each service. "services": all numbers of each
-    service. Lengths are in m, times in s, ages in ticks. Counters begin when every service was ready, or at the last restart of their
+    "hold_ticks": number of ticks in which a part was in hold (stood still, followed no commands). "table_contact_ticks",
+    "field_contact_ticks", "solid_contact_ticks": number of ticks in which the table was touched, fields (volumes that cause repulsive
+    forces) were in contact, and solids were in contact. "missed_ticks": number of skipped ticks. "pairs_watched": number of pairs of bodies
+    that are tested for contact. "rejected_commands": number of refused commands, by reason. "command_age_ticks": percentiles of the age of
+    commands. "lockstep": for a run in lockstep (every tick waits for all participants), the number of ticks, the speed (times real time),
+    whether the run is repeatable, and the hash of its states. "restarts": number of restarts of each service. "services": all numbers of
+    each service. Lengths are in m, times in s, ages in ticks. Counters begin when every service was ready, or at the last restart of their
     service.
     """
     stats = {child.who: child.stat for child in children if child.stat is not None}

@@ -31,8 +31,9 @@ END_TIMEOUT = 2.0  # s from SIGTERM to SIGKILL
 
 
 class Supervisor:
-    """Starts and supervises the child processes of the launcher. All its work is done in the main thread, by handlers of `service`.
+    """Starts and supervises the child processes of the launcher. All its work is done in the main thread.
 
+    It is done by handlers of `service`, the launcher's connection to the bus.
     `children`: the services of this host, by name. `faults`: one line for each service that was given up (is not restarted any more).
     `stopped_robot`: whether the robot was stopped, because a vital service (`Program.vital`) was given up. `bad_settings`: whether a
     service was given up because it cannot use its settings.

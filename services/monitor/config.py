@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Settings of the monitor."""
+"""Settings of the monitor, the service that shows the running system on a web page."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Executes the commands of the page by calls on the bus. At any time at most one page holds the controls."""
+"""Executes the commands of the monitor's web pages by calls on the bus. At any time at most one page holds the controls."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ FARTHEST = 3.0  # m: a place farther from the origin is a mistake
 
 @dataclass
 class Known:
-    """The newest messages that the commands of the page depend on. The main thread writes them; other threads read them.
+    """The newest messages that the commands of the monitor's web page depend on. The main thread writes them; other threads read them.
 
     `gates`: state of robot_sim's safety gate (check of commands), by part. `stopped`: monotonic time [s] at which all parts last reported
     an emergency stop. `motions`, `reaches`: the newest message, by part. `objects`: objects of the world of the service `model`, by name.
@@ -81,7 +81,7 @@ class _Taken:
 
 
 class PageControls:
-    """Executes the commands of all pages.
+    """Executes the commands of all open web pages of the monitor.
 
     The threads of the web server call its methods. It executes one command at a time; only "stop" does not wait for other commands. A
     method returns when the other services have answered.

@@ -322,7 +322,7 @@ class MonitorNode:
         self._teller.forget_run()
 
     def end(self) -> None:
-        """Give all parts back to their agents, and show on the open pages that the system has ended."""
+        """Give all parts that pages have taken back to their agents, and show on the open pages that the system has ended."""
         controls = self._output.controls.real
         if isinstance(controls, PageControls):
             controls.give_all_back()

@@ -48,7 +48,7 @@ class Story:
     """The record of a run: the values that the monitor's page showed during the run.
 
     `tracks`: the recorded values, by name. `robot`: the robot of the run. `begin`, `end`: times of the first pose and of the last value
-    [s].
+    [s of the robot's time].
     """
 
     def __init__(self, run: Path) -> None:

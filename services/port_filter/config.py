@@ -53,6 +53,6 @@ class Config(WorldConfig, frozen=True, kw_only=True):
 
     @property
     def reflex(self) -> ReflexSettings:
-        """The settings of the reflex, taken from these settings."""
+        """The settings of the reflex (which moves the robot back from a violation along its past poses), taken from these settings."""
         names = ("history", "confirm", "release", "brake", "dead_time", "pace", "must_be_clear")
         return ReflexSettings(**{name: getattr(self, name) for name in names})

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Forwards calls, part metadata, emergency stops and the router's liveliness token between robot_sim and clients of the port filter."""
+"""Forwards calls, part metadata, emergency stops and the router's liveliness token between robot_sim and its clients.
+
+The port filter is a process between them; it moves the robot back if a motion leads into contact.
+"""
 
 from __future__ import annotations
 
@@ -31,10 +34,10 @@ class Owner:
 class DriveServer:
     """Forwards the drive calls of clients to robot_sim, unless the reflex is active.
 
-    The reflex moves the robot back along its past poses after a violation (a contact, or a pose beyond the limits of its motors).
-    The calls are take, arm, release, and hold, which stops a part. A client that takes a drive (the right to command a part's motors) gets
-    the epoch (number of the ownership) that robot_sim has given to the filter. `epochs`: dict from a part to the newest of these epochs;
-    0: none yet.
+    It belongs to the port filter, a process between the clients and robot_sim. The reflex moves the robot back along its past poses after a
+    violation (a contact, or a pose beyond limits or clauses, which are constraints on several joints). The calls are take, arm, release,
+    and hold, which stops a part. A client that takes a drive (the right to command a part's motors) gets the epoch (number of the
+    ownership) that robot_sim has given to the port filter. `epochs`: dict from a part to the newest of these epochs; 0: none yet.
     """
 
     def __init__(self, service: Service, twin: Service, robot: Robot, refusal: Callable[[], str], on_arm: Callable[[], None]) -> None:

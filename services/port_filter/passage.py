@@ -70,8 +70,8 @@ class CommandStream:
     def put(self, epoch: int, re_k: int, mode: Mode, reference: list[float], ttl: int) -> None:
         """Publish a command to robot_sim.
 
-        `epoch`: number of the ownership of the part's drive. `re_k`: tick of the state from which the command was computed. `reference`:
-        (n_part,) rad, rad/s or N m, by `mode`. `ttl`: lifetime [ms].
+        `epoch`: number of the filter's ownership of the part, given by robot_sim. `re_k`: tick of the state from which the command was
+        computed. `reference`: (n_part,) rad, rad/s or N m, by `mode`. `ttl`: lifetime [ms].
         """
         self._stream.put(epoch=epoch, re_k=re_k, mode=mode, ref=reference, ttl=ttl)
         self._seq += 1
@@ -92,8 +92,8 @@ class Streams:
     """Passes the states of all parts to the clients, and the clients' commands to robot_sim.
 
     `commands`: dict from a part to its stream of commands to robot_sim. `is_stale`: True if the newest state of a part is more than 0.1 s
-    older than the tick; the pose is then not checked, and commands are refused. `answered`: function that is called with the message and
-    the answer when, in lockstep, a client's `Commands` message also contains its answer to a tick.
+    older than the tick; the pose is then not checked for contacts and limits, and commands are refused. `answered`: function that is called
+    with the message and the answer when, in lockstep, a client's `Commands` message also contains its answer to a tick.
     """
 
     def __init__(
@@ -129,7 +129,8 @@ class Streams:
     def publish(self, tick: Tick) -> None:
         """Publish the robot's tick to the clients.
 
-        While clients may not command because of the reflex, the message shows each armed part in the state hold, without a command.
+        While clients may not command because of the reflex, the message shows each armed part (part that may move) in the state hold,
+        without a command.
         """
         parts = {part: self._for_clients(part, state) for part, state in tick.parts.items()}
         self._tick.put(dt=tick.dt, mode=tick.mode, rate=tick.rate, q=tick.q, parts=parts)
@@ -139,7 +140,7 @@ class Streams:
         return self._q
 
     def follows(self, part: str) -> bool:
-        """Return whether a part follows the filter's commands: in the newest tick it is armed, and the filter is its owner."""
+        """Return whether a part follows the filter's commands: it is armed (it may move) in the newest tick, and the filter owns it."""
         state = self._parts.get(part)
         return state is not None and state.gate == "armed" and state.epoch == self._epochs[part]
 

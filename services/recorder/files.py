@@ -23,8 +23,8 @@ class Channel:
     """The messages of one key in one encoding. Channels with equal fields are the same channel.
 
     `topic`: the key. `encoding`: short name of the encoding: msgpack, json or cdr. `about`: for messages that are recorded unchanged, the
-    full encoding string that was sent with them on the bus (`bus_schema.encoding_of`); empty for copies. `schema`: name of the schema;
-    empty: none. `schema_encoding`, `definition`: format and content of the schema.
+    full encoding string that was sent with them on the bus (`bus_schema.encoding_of`); empty for copies of messages in another format.
+    `schema`: name of the schema; empty: none. `schema_encoding`, `definition`: format and content of the schema.
     """
 
     topic: str

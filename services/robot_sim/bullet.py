@@ -72,7 +72,7 @@ class BulletBackend:
         return SolidContact(self._deepest[pair], pair)
 
     def contacts(self) -> Mapping[str, float]:
-        """Return a dict from each pair in solid contact ("NAME NAME", sorted) to the largest depth [m] in the last tick."""
+        """Return the largest depth [m] in the last tick of each pair in solid contact; key: "NAME NAME", the names sorted by alphabet."""
         return self._deepest
 
     def gap(self) -> float:

@@ -59,8 +59,9 @@ class Order(Struct, frozen=True, eq=False):
     """A command to one part, as it arrived in `Command` or `Commands`.
 
     `src`: sender. `seq`: sequence number of the message. `epoch`: number of the sender's ownership of the part. `re_k`: tick that the
-    command answers. `reference`: (n_part,) rad, rad/s or N m, by `mode`. `ttl`: time [ms] from the start of tick `re_k` after
-    which the part no longer follows the command. In lockstep this time is always 3 ticks (LOCKED_TTL) instead.
+    command answers. `reference`: (n_part,) rad, rad/s or N m, by `mode`. `ttl`: time [ms] from the start of tick `re_k` after which the
+    part no longer follows the command. In lockstep (every tick waits for all participants) this time is always 3 ticks (LOCKED_TTL)
+    instead.
     """
 
     src: str
@@ -249,7 +250,8 @@ HOLD = Drive("hold")
 class InForce(Struct, frozen=True):
     """The command that a part follows at present.
 
-    `expires`: time from which the part no longer follows it (end of its `ttl`), ns of the monotonic clock; not used in lockstep.
+    `expires`: time from which the part no longer follows it (end of its `ttl`), ns of the monotonic clock; not used in lockstep, in which
+    every tick waits for all participants.
     """
 
     order: Order
@@ -349,7 +351,7 @@ class Gate:
     def force_hold(self, why: str) -> None:
         """Put the part in hold at once, if it is armed, without a request of the owner: it brakes and stands still.
 
-        `why`: reason, for the event.
+        `why`: reason, for the text that the gate reports.
         """
         if self.state == "armed":
             self._enter("hold", why)
@@ -364,7 +366,7 @@ class Gate:
         self.force_hold(f"its owner {who} is gone")
 
     def stop(self, why: str) -> None:
-        """Enter the state estop (emergency stop), which lasts until `reset_stop`; `why`: reason, for the event."""
+        """Enter the state estop (emergency stop), which lasts until `reset_stop`. `why`: reason, for the reported text."""
         if self.state != "estop":
             self._enter("estop", why)
 
@@ -376,7 +378,7 @@ class Gate:
     def fail(self, bit: int, why: str) -> None:
         """Record a fault of the part, which only a new run clears.
 
-        `bit`: value of the fault in the bit field `faults`, a power of two. `why`: reason, for the event.
+        `bit`: value of the fault in the bit field `faults`, a power of two. `why`: reason, for the text that the gate reports.
         """
         self.faults |= bit
         if self.state not in ("fault", "estop"):

@@ -113,7 +113,7 @@ class Guard:
                 gate.force_hold(f"its owner {who} is late")
 
     def hold_all(self, why: str) -> None:
-        """Put every armed part in hold at once: it brakes and stands still. `why`: reason, for the event."""
+        """Put every armed part (part that may move) in hold at once: it brakes and stands still. `why`: reason, for the event."""
         for gate in self.gates.values():
             gate.force_hold(why)
 

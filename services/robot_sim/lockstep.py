@@ -48,8 +48,9 @@ class Lockstep:
     def wait(self, k: int) -> None:
         """Wait for the answers of the present participants to tick k, then give the waiting commands to the safety gates.
 
-        The order of the commands does not depend on their arrival. If a participant does not answer in time, the parts that it owns are put
-        in hold (they brake and stand still); if it is the model, all parts are put in hold.
+        A safety gate is the last check of a part's commands. The order of the commands does not depend on their arrival. If a participant
+        does not answer in time, the parts that it owns are put in hold (they brake and stand still); if it is the model, all parts are put
+        in hold.
         """
         for who in self._barrier.wait(k):
             self._guard.hold_dependents(who)

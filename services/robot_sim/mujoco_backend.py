@@ -23,7 +23,7 @@ Mask = NDArray[np.bool_]
 
 
 class MujocoBackend:
-    """All joints of any robot with gravity in MuJoCo; the base of the robot is fixed.
+    """Simulates all joints of any robot in MuJoCo, with gravity; the base of the robot is fixed.
 
     Except in torque mode, a motor is a constraint on the velocity of its joint. The torque of this constraint is limited to the
     largest torque of the motor, and holds the robot against gravity. In torque mode the commanded torque acts through a gear with the

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Runs robot_sim, tick by tick.
 
-A tick has four steps: the safety gates command the motors; the messages `Tick` and `Clock` are published; the physics advances by a tick;
-then each part is read at its own sampling time, and its state is published. In lockstep all parts are read and published before `Tick`.
+A tick has four steps: the safety gates (the last check of commands) command the motors; the messages `Tick` and `Clock` are published; the
+physics advances by a tick; then each part is read at its own sampling time, and its state is published. In lockstep all parts are read and
+published before `Tick`.
 """
 
 from __future__ import annotations

@@ -114,8 +114,8 @@ class Sensors:
         """Read parts at their times in this tick, by interpolation between its start (`begin`) and its end, with encoder noise.
 
         `shares`: pairs (share, part): the part is read when this share of the tick (0 to 1) has passed. The velocities have no noise, and
-        are those of the motors before the backlash. The readings of each part are published on `{part}/state`. `gates`: the safety gate of
-        each part, whose state is published, too.
+        are those of the motors, on the input side of the backlash. The readings of each part are published on `{part}/state`. `gates`: the
+        safety gate of each part, whose state is published, too.
         """
         q, dq, tau = motors.q, motors.motor_velocities, motors.efforts
         noise = motors.encoders(self._bus.k, self._dt) - q + self._errors
@@ -151,7 +151,8 @@ class Sensors:
     def publish(self, mode: Literal["free", "lock", "paused"], dt: int, rate: float) -> None:
         """Publish the message `Tick`, which starts the tick. Before every part has been read since the reset, nothing is published.
 
-        `mode`: free, lock (lockstep) or paused. `dt`: length of the tick, ns. `rate`: simulated seconds per second of real time.
+        `mode`: free (ticks follow real time), lock (lockstep: each tick waits for all participants) or paused. `dt`: length of the tick,
+        ns. `rate`: simulated seconds per second of real time.
         """
         if len(self._statuses) == len(self._where):
             self._tick.put(dt=dt, mode=mode, rate=rate, q=self._q.tolist(), parts=self._statuses)

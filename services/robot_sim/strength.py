@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Gives a robot other largest torques of motors than its file has, for instance smaller ones for the fingers."""
+"""Replaces the largest torques of a robot's motors, which its file states, by given values, for example smaller ones for the fingers."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from mobee.robot.robot import Robot
 
 
 def with_torques(robot: Robot, torques: Mapping[str, float]) -> Robot:
-    """Return the robot with other largest torques of its motors.
+    """Return a copy of the robot in which some motors have a new largest torque.
 
     `torques`: torque [N m] by pattern of motor names, such as "?_thumb_*"; the first pattern that matches a motor counts. Raises
     UnknownName for a pattern that matches no motor.

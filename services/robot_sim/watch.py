@@ -94,8 +94,9 @@ class Counters:
         """Count the tick, and record the age of the oldest command that a part follows; call this once per tick.
 
         The age of a command is the number of ticks since the tick from whose state it was computed.
-        The tick also counts in `hold_ticks` if at least one owned part is in hold (it brakes and stands still), and in `armed_ticks` if all
-        owned parts follow commands. `gates`: the safety gates of all parts.
+        A part is owned if a process has the right to command it. The tick also counts in `hold_ticks` if at least one owned part follows no
+        command (it brakes and stands still), and in `armed_ticks` if there are owned parts and all of them follow commands. `gates`: the
+        safety gates of all parts.
         """
         self.ticks += 1
         owned = [gate for gate in gates if gate.state != "idle"]
@@ -269,7 +270,10 @@ class Watch:
         self.counters.missed_before = missed
 
     def reset(self) -> None:
-        """Drop stops in progress and the deepest contact; call this at the start of a new run. Counts of the measurement continue."""
+        """Discard the stops that have not ended (`Stops`), and the deepest contact since the last `sim/truth` message.
+
+        Call this when a new run begins. The counts of the measurement continue.
+        """
         self.counters.stops.forget()
         self._deepest = SolidContact()
 

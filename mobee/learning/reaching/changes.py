@@ -43,12 +43,13 @@ DetectorOf = Callable[[], Detector]
 
 
 class RunLength:
-    """Bayesian online change point detection (Adams and MacKay 2007): a change is detected when it is more probable than no change.
+    """Bayesian online change point detection (Adams and MacKay 2007) for the share of outcomes that contradict what was learned.
 
-    Between two changes, a constant share of the outcomes contradicts what was learned and has the probability `unknown`; the others have
-    the probability `learned`. The share and the probability of a change are unknown, not settings: the detector weighs all values in
-    `SHARES` (0.01 to 0.95) and `HAZARDS` (0.01 to 0.00001) by their probability. A decrease of the share is not reported, because it
-    occurs without a change of the world: the predictions of the learner become better.
+    A change is reported when it is more probable than no change, and when the share has increased with a probability of at least 0.95
+    (CERTAIN). Between two changes, a constant share of the outcomes contradicts what was learned and has the probability `unknown`; the
+    others have the probability `learned`. The share and the probability of a change are unknown, not settings: the detector weighs all
+    values in `SHARES` (0.01 to 0.95) and `HAZARDS` (0.01 to 0.00001) by their probability. A decrease of the share is not reported, because
+    it occurs without a change of the world: the predictions of the learner become better.
     """
 
     def __init__(self) -> None:
@@ -160,7 +161,8 @@ class WorldChanges:
 
         For a transition they are the probabilities of what happened: that it ended in its goal, or that it did not. For a reach they are
         densities of its reward. Call this before the learner learns from the step. None if a transition ended in contact with the target,
-        because the target may then have caused its outcome. `target`: (3,) m. `goal`: the goal state of a transition.
+        because the target may then have caused its outcome. `target`: (3,) m, root frame, position of the target. `goal`: the goal state of
+        a transition.
         """
         if step.a == REACH:
             variance = self._variance(step.s, target)
@@ -174,7 +176,8 @@ class WorldChanges:
     def observe(self, step: Step, target: Array, probabilities: tuple[float, float]) -> bool:
         """Process a step after the learner has learned from it; return whether a change of the world was detected.
 
-        `target`: (3,) m. `probabilities`: the result of `WorldChanges.probabilities` for this step, before the learner learned from it.
+        `target`: (3,) m, root frame, position of the target. `probabilities`: the result of `WorldChanges.probabilities` for this step,
+        before the learner learned from it.
         """
         self._is_reach.append(step.a == REACH)
         if step.a == REACH:
@@ -189,9 +192,9 @@ class WorldChanges:
     def report(self) -> None:
         """Record that the world changes now; for a change that is known without the detector.
 
-        From now on, the memory of failed transitions infers only from later transitions which of them the world blocks for all targets. A
-        predictor that can compare worlds (`WorldComparer`) treats later rewards as those of another world. A new detector is made, because
-        the outcomes before this change are no evidence about later changes.
+        The memory of failed transitions estimates which transitions the world blocks for all targets; from now on, it uses only later
+        transitions for this estimate. A predictor that can compare worlds (`WorldComparer`) treats later rewards as those of another world.
+        A new detector is made, because the outcomes before this change are no evidence about later changes.
         """
         self._failures.change(0)
         begin_world(self._predictor)

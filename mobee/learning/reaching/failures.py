@@ -68,7 +68,7 @@ class AlikeFailures:
     def add(self, state: int, action: int, target: Array, reward: float, touched: tuple[str, ...] = ()) -> None:
         """Record the reward of a transition, an action in a state: 0 if it succeeded, below 0 if it failed.
 
-        `target`: (3,) m, the target that was presented meanwhile. `touched`: not used.
+        `target`: position (3,) m, root frame, of the target that the agent was trying to reach. `touched`: not used.
         """
         transition, tried = state * self._shape[1] + action, self._own.setdefault(target.tobytes(), {})
         total, count = tried.get(transition, (0.0, 0))
@@ -82,7 +82,10 @@ class AlikeFailures:
         self._failed += reward < 0.0
 
     def rewards(self, target: Array) -> Array:
-        """Return the expected reward of each transition while a target at (3,) m is presented, shape (S, A), at most 0."""
+        """Return the expected reward of each transition while the agent tries to reach a target, shape (S, A), at most 0.
+
+        `target`: position (3,) m, root frame.
+        """
         usual = self._failed / (self._used + 1.0)
         failed, weight = self._alike(target)
         more = (failed + PRIOR_WEIGHT * usual) / (weight + PRIOR_WEIGHT) - usual
@@ -146,12 +149,15 @@ class Failures:
     def add(self, state: int, action: int, target: Array, reward: float, touched: tuple[str, ...] = ()) -> None:
         """Record the reward of a transition, an action in a state: 0 if it succeeded, below 0 if it failed.
 
-        `target`: (3,) m, the target that was presented meanwhile. `touched`: not used.
+        `target`: position (3,) m, root frame, of the target that the agent was trying to reach. `touched`: not used.
         """
         self._histories.add(state * self._shape[1] + action, target, reward)
 
     def rewards(self, target: Array) -> Array:
-        """Return the expected reward of each transition while a target at (3,) m is presented, shape (S, A), at most 0."""
+        """Return the expected reward of each transition while the agent tries to reach a target, shape (S, A), at most 0.
+
+        `target`: position (3,) m, root frame.
+        """
         return self._histories.average(target, 0.0).reshape(self._shape)
 
     def copy(self) -> Failures:
@@ -194,7 +200,8 @@ class FailuresSinceChange:
     def add(self, state: int, action: int, target: Array, reward: float, touched: tuple[str, ...] = ()) -> None:
         """Record the reward of a transition, an action in a state: 0 if it succeeded, below 0 if it failed.
 
-        `target`: (3,) m, the target that was presented meanwhile. `touched`: names of the world objects in contact at the end.
+        `target`: position (3,) m, root frame, of the target that the agent was trying to reach. `touched`: names of the world objects in
+        contact at the end.
         """
         self._usual.add(state, action, target, reward)
         if not by_target(touched):
@@ -222,7 +229,10 @@ class FailuresSinceChange:
         return float((failed + self._alike()[transition]) / (count + 1.0))
 
     def rewards(self, target: Array) -> Array:
-        """Return the expected reward of each transition while a target at (3,) m is presented, shape (S, A), at most 0."""
+        """Return the expected reward of each transition while the agent tries to reach a target, shape (S, A), at most 0.
+
+        `target`: position (3,) m, root frame.
+        """
         usual = self._usual.rewards(target)
         if not self._changed:
             return usual

@@ -135,7 +135,7 @@ class ReachLearner:
 
     @property
     def under_way(self) -> int | None:
-        """The index in `problems.targets` of the target that the agent tries to reach now; None if there is no such attempt."""
+        """The index of the target of the present attempt, in `problems.targets` (the targets tried so far); None if there is none."""
         return self._problem
 
     def begin(self, target: ReachTarget) -> None:

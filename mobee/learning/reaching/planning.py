@@ -73,7 +73,7 @@ class ReachPlanning:
 
 @dataclass(frozen=True, slots=True)
 class ReachPlan:
-    """A path to a state, and the reach from there.
+    """A path to a state, and a reach (a motion in which a force pulls a marker to a target) that starts in this state.
 
     `path`: states from the start to the state of the reach. `actions`: the action in each state of the path except the last.
     `probabilities`: the probability that each action ends in the next state of the path; `success`: the product of them. `state`: where the

@@ -126,11 +126,11 @@ class ReachAgent(ReachLearner):
         """Learn from problem-tries on another plant, for example a simulated robot in the world as it is perceived now.
 
         A problem-try is one attempt to reach one target. After the robot has perceived a change of the world, such as a new object,
-        practice reduces the number of tries on the robot. If the agent has a detector of changes, it assumes that the world changed just
-        before the first of these tries. The predictor "gp" estimates how similar the robot's later rewards are to those on the other plant
-        and to those before the change. Less similar rewards have less influence on its predictions. A problem-try under way is ended first.
-        The attributes `tries` and `steps` include the tries and actions on both plants. `plant`: moves the space's robot. `problems`,
-        `tries`: as in `learn`.
+        practice reduces the number of tries on the robot. If the agent has a detector of changes, the agent assumes that the world changed
+        just before the first of these tries. The predictor "gp" estimates how similar the robot's later rewards are to those on the other
+        plant and to those before the change. Less similar rewards have less influence on its predictions. A problem-try under way is ended
+        first. The attributes `tries` and `steps` include the tries and actions on both plants. `plant`: moves the space's robot.
+        `problems`, `tries`: as in `learn`.
 
         Raises InvalidValue for a plant of another robot, or if the agent has a store, which holds what happened to one robot only.
         """

@@ -67,14 +67,14 @@ class Strategy(Protocol):
     """
 
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:
-        """Learn from a reach that began in `state`, for a target (3,) m.
+        """Learn from a reach that began in `state`, for a target (3,) m, root frame.
 
         `reward`: the observed reward. `expected`: the reward that the predictor expected before the reach.
         """
         ...
 
     def rewards(self, target: Array, rng: np.random.Generator) -> Array:
-        """Return the reward of a reach from each state for a target (3,) m, shape (S,).
+        """Return the reward of a reach from each of the S states for a target (3,) m, root frame; shape (S,).
 
         `rng`: random generator; it gives the same random numbers in each call within one problem-try (attempt to reach one target).
         """
@@ -82,9 +82,9 @@ class Strategy(Protocol):
 
 
 class Random:
-    """A strategy: the reward of a reach is 1 from one state, drawn for each problem-try, and 0 from all others (thesis 8.3.2).
+    """A strategy: the planned reward of a reach is 1 from one state, drawn for each problem-try, and 0 from all others (thesis 8.3.2).
 
-    A problem-try is one attempt to reach one target.
+    The planned reward is the reward in the learner's plans. A problem-try is one attempt to reach one target.
     """
 
     def __init__(self, reaches: Reaches, predictor: RewardPredictor) -> None:
@@ -101,9 +101,10 @@ class Random:
 
 
 class Greedy:
-    """A strategy: the reward of a reach is the reward that the predictor expects (thesis eq. 8.5).
+    """A strategy: the planned reward of a reach is the reward that the predictor expects (thesis eq. 8.5).
 
-    The expected reward may be too high where little was tried: the predictor `Weighted` expects 1 for a state that was never tried.
+    The planned reward is the reward in the learner's plans. The expected reward may be too high where little was tried: the predictor
+    `Weighted` expects 1 for a state that was never tried.
     """
 
     def __init__(self, reaches: Reaches, predictor: RewardPredictor) -> None:
@@ -118,10 +119,11 @@ class Greedy:
 
 
 class Intrinsic:
-    """A strategy: the reward of a reach is the prediction error to expect (thesis eqs. 8.6 and 8.7).
+    """A strategy: the planned reward of a reach is the prediction error to expect (thesis eqs. 8.6 and 8.7).
 
-    An error is the expected minus the observed reward. The error to expect is a weighted average over earlier reaches from the same state;
-    errors with nearer targets have larger weights. One imagined error of 1 is included in the average, with the weight of distance 0.
+    The planned reward is the reward in the learner's plans. An error is the expected minus the observed reward. The error to expect is a
+    weighted average over earlier reaches from the same state; errors with nearer targets have larger weights. One imagined error of 1 is
+    included in the average, with the weight of distance 0.
     """
 
     def __init__(self, reaches: Reaches, predictor: RewardPredictor) -> None:
@@ -140,9 +142,9 @@ class Intrinsic:
 
 
 class UpperBound(Greedy):
-    """A strategy: the reward of a reach is the predictor's expected reward plus two of its standard deviations.
+    """A strategy: the planned reward of a reach is the predictor's expected reward plus two of its standard deviations.
 
-    It needs a predictor that has deviations.
+    The planned reward is the reward in the learner's plans. The strategy needs a predictor that has deviations.
     """
 
     def rewards(self, target: Array, rng: np.random.Generator) -> Array:
@@ -151,9 +153,10 @@ class UpperBound(Greedy):
 
 
 class Thompson(Greedy):
-    """A strategy: the rewards of all reaches are one random sample from the predictor, drawn for each problem-try (Thompson sampling).
+    """A strategy (Thompson sampling): the planned rewards of all reaches are one random sample from the predictor for each problem-try.
 
-    It needs a predictor that can be sampled. A problem-try is one attempt to reach one target.
+    A planned reward is a reward in the learner's plans. The strategy needs a predictor that can be sampled. A problem-try is one attempt to
+    reach one target.
     """
 
     def rewards(self, target: Array, rng: np.random.Generator) -> Array:

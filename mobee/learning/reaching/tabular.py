@@ -23,12 +23,13 @@ World = Callable[[Array], tuple[Array, Array]]
 class ReachTable(TabularPlant):
     """A `TabularPlant` that can also reach for a target. The target given to `present` may block transitions.
 
-    The random outcome of the n-th action depends only on the seed and n.
+    The random numbers of the n-th action or reach depend only on the seed and n. In shapes, S is the number of states, A the largest number
+    of actions of a state, and B the largest number of outcomes of an action.
 
     Args:
         space: the states and transitions.
         outcomes: (S, A, B) the states in which each transition may end.
-        probabilities: (S, A, B) of the outcomes, if no target blocks the transition.
+        probabilities: (S, A, B) the probabilities of the outcomes, if no target blocks the transition.
         world: a function of a target's position (3,) m, called once for each position. It returns the mean remaining distance [m] of a
             reach from each state, (S,), and the probability that the target blocks each transition, (S, A). A blocked transition ends in
             its start state.

@@ -30,7 +30,7 @@ class Problems:
         return len(self.targets)
 
     def index(self, target: ReachTarget) -> int:
-        """Return the number of the problem with the target's position; a new position gets the next number."""
+        """Return the number of the problem (the target with this position); a new position gets the next number, from 0."""
         number = self._known.setdefault(place(target), len(self.targets))
         if number == len(self.targets):
             self.targets.append(target)
@@ -51,7 +51,7 @@ class Problems:
 
 
 def place(target: ReachTarget) -> bytes:
-    """Return the key of a problem in dicts: the bytes of the target's position."""
+    """Return the key under which dicts store a target: the bytes of its position."""
     return (target.position + 0.0).tobytes()  # -0 and 0 are one position
 
 

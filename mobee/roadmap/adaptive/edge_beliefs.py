@@ -26,7 +26,8 @@ class EdgeBeliefs:
     The class has the interface of `mobee.learning.value_iteration.OutcomeModel`, so planners can use it.
 
     Args:
-        goals: (S, A) goal vertex of each edge; NO_ACTION (-1) where there is no edge.
+        goals: (S, A) goal vertex of each edge; row: vertex where the edge begins (S vertices), column: number of the edge there (at most
+            A edges); NO_ACTION (-1) where there is no edge.
         mode: "remove": a failed edge is excluded (p = 0) until it succeeds; all other edges have p = 1 (thesis). "reweigh": p is the mean
             of a Beta distribution over weighted counts of successes and failures.
         forgetting: factor on all counts at each observation of any edge, in (0, 1], so that old failures are forgotten; no effect with

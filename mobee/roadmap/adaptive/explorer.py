@@ -23,7 +23,7 @@ Query = Callable[[Array, Array], Array | None]
 
 
 class MapExplorer(Walker):
-    """A `Walker` that moves to untried edges of an adaptive roadmap until all reachable edges were tried.
+    """Moves one part of a robot to untried edges of an adaptive roadmap until all reachable edges were tried; a subclass of `Walker`.
 
     A vertex may have feasible edges that lead to it and none that leave it. At such a vertex the explorer queries a path to a vertex with
     untried edges, and adds this path to the map. A new explorer with the same store continues where the last one stopped.
@@ -58,7 +58,7 @@ class MapExplorer(Walker):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The settings of the `Walker` and the seed, as plain JSON values."""
+        """The settings of the base class `Walker` and the seed, as plain JSON values."""
         return super().settings | {"seed": self.seed}
 
     def explore(self, edges: int | None = None) -> bool:

@@ -63,7 +63,7 @@ class MapStore(TransitionStore):
             self._db.execute("INSERT INTO map_changes VALUES (?, ?, ?, ?)", (self.agent, number, self._last, json.dumps([what, given])))
 
     def changes(self) -> list[Change]:
-        """Return all changes of this agent's map, in order."""
+        """Return all changes of this agent's map, the oldest first."""
         with explained(self.path):
             if self._db.execute("SELECT 1 FROM sqlite_master WHERE name = 'map_changes'").fetchone() is None:
                 return []
@@ -86,7 +86,7 @@ class MapRecord:
     Args:
         roadmap: the map. If the store has content, the recorded observations and changes are applied to it.
         store: the file of observations and changes; None: nothing is written.
-        settings: settings of the walker or explorer, which must equal those in the store.
+        settings: settings of the object that moves the robot along the map (`Walker` or `MapExplorer`). They must equal those in the store.
 
     Raises:
         MobeeError: the store belongs to another map or to other settings.

@@ -42,7 +42,7 @@ def build_roadmap(
     file: str | Path | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> Roadmap:
-    """Build a roadmap: poses within the tolerances of all costs, without contacts, spread evenly over the box of a task.
+    """Build a roadmap: poses within the tolerances of all costs, without contacts, spread evenly over a box of task coordinates.
 
     The same seed gives the same roadmap, also if the building was interrupted and resumed.
 
@@ -50,7 +50,7 @@ def build_roadmap(
         model: robot and world; the world must not change while the roadmap is built.
         costs: terms of mobee.costs, and plain functions of pose and contacts.  The term `collision` is added if it is absent.  Costs may be
             called from several threads.
-        task: a task space of mobee.tasks.
+        task: a task space of mobee.tasks; its box is the range of each task coordinate.
         spacing: distance between vertices in the units of the task's coordinates: one number, or one per coordinate.
         start: (n,) rad, where the search for the first pose begins, and the posture of the motors that may not move; None: home.
         motors: names of the parts and motors that may move; None: all.

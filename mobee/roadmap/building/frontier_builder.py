@@ -45,8 +45,8 @@ class EvaluatedPoses:
 class PoseEvaluator:
     """Evaluates the cost, validity and task coordinates of poses.
 
-    `problem`: has the robot's model and the terms of the cost. `task`: the task space and its box. `spacing`: (m,) distance between
-    vertices in each task coordinate. `pool`: executor whose threads share the work; None: one thread.
+    `problem`: has the robot's model and the terms of the cost. `task`: the task space and its box (the ranges of its coordinates).
+    `spacing`: (m,) distance between vertices in each task coordinate. `pool`: executor whose threads share the work; None: one thread.
     """
 
     def __init__(self, problem: Problem, task: Task, spacing: Array, pool: Executor | None = None) -> None:
@@ -119,8 +119,8 @@ class FrontierBuilder:
     """Grows a roadmap by searches with an evolution strategy (thesis Algorithms 3 and 4).
 
     Each `step` computes one generation of every search and adds the vertices that the searches found. The attribute `frontier` holds the
-    points of the vertices in the task space, divided by the spacing. The attribute `problem` is the evaluator's pose search problem; it
-    also counts the evaluated poses.
+    points of the vertices in the task space, divided by `evaluator.spacing`. The attribute `problem` is the evaluator's pose search
+    problem; it also counts the evaluated poses.
 
     Args:
         evaluator: computes the costs and task coordinates of poses.

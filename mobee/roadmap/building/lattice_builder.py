@@ -123,8 +123,8 @@ class FailedPoint:
     """A lattice point, or a point half-way between lattice points, for which no valid pose was found so far.
 
     `q`: (n,) rad, the best posture found; for an intermediate point that was not tried yet, the posture of the lattice point beside it.
-    `violation`: sum of weight * residual over the terms that the posture `q` violates (residual above tolerance); infinite if least squares
-    has found no posture at the point. `left`: number of tries left.
+    `violation`: sum of weight * residual over the terms of the cost that the posture `q` violates (residual above tolerance); infinite if
+    least squares has found no posture at the point. `left`: number of tries left.
     """
 
     q: Array
@@ -277,7 +277,7 @@ class LatticeBuilder:
 
     @property
     def vertices(self) -> int:
-        """Number of vertices found so far."""
+        """Number of vertices (points for which a valid pose was found) so far."""
         return len(self._table.q)
 
     @property

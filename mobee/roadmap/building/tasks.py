@@ -69,7 +69,7 @@ class Task:
         return np.array([(one.low, one.high) for one in self.coordinates])
 
     def of(self, pose: Pose) -> Array:
-        """Compute the task coordinates (N, m) of a batch of poses q (N, n); raises InvalidValue if one is not finite."""
+        """Compute the task coordinates (N, m) of a batch of poses q (N, n); raises InvalidValue if a coordinate is not finite."""
         y = np.stack([np.asarray(one.function(pose), dtype=np.float64) for one in self.coordinates], axis=-1)
         if not np.isfinite(y).all():
             where = np.argwhere(~np.isfinite(y))[0]
@@ -77,7 +77,10 @@ class Task:
         return y
 
     def aims(self, robot: Robot, y: Array) -> tuple[Aim, ...] | None:
-        """Return the residuals of type `Aim` for least squares that are 0 at task coordinates y (m,); None if one has no derivative."""
+        """Return the residuals of type `Aim` for least squares that are 0 at task coordinates y (m,).
+
+        None if a coordinate has no derivative.
+        """
         found: list[Aim] = []
         for one, value in zip(self.coordinates, y, strict=True):
             if one.aims is None:

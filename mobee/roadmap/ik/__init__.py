@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Poses from costs: natural gradient inverse kinematics (thesis 3.2)."""
+"""Inverse kinematics: finds poses that minimise a cost, by natural evolution strategies or least squares (thesis 3.2)."""

@@ -49,9 +49,9 @@ class Descent:
 
     @cached_property
     def drawn(self) -> Flags:
-        """Whether each of the d motors that may move needs random positions in random start poses, (d,).
+        """Which of the d motors that may move must have random positions in random start poses, (d,) booleans.
 
-        It needs them if it affects an aim, or a term (except "collision") that has a tolerance but no derivative.
+        These are the motors that affect an aim, or a term (except "collision") that has a tolerance but no derivative.
         """
         return needed(self._problem, self._aims)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads solids from collision geometry, and generates the fields around them."""
+"""Reads solids from collision geometry, and generates fields (volumes that cause repulsive forces) around them."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ HEAVIEST = 1e6  # kg
 def read_mass(node: Node, draft: Draft, place: Place) -> None:
     """Read a <mass> and add it to `draft`, the robot read so far; raises RobotFileError if it is not valid.
 
-    Several masses on one link are added up later.
+    Several masses on one link are added up later. `place`: position of the <mass> in the tree of the file.
     """
     mass = node.positive("value", unit="kilograms")
     if mass > HEAVIEST:
@@ -58,8 +58,8 @@ def read_skeleton(node: Node, draft: Draft, place: Place, centre: Array, axis: A
     """Add the solid and the field that the attributes `radius` and `field` of a <link> or <joint> describe.
 
     They are added to `draft`, the robot read so far. Both are cylinders; a field is a volume that causes a repulsive force. `centre`: (3,)
-    m, of the cylinders, root frame. `axis`: (3,), direction of their axis, not necessarily a unit vector. `length`: their length, m. Raises
-    RobotFileError if the element is not valid.
+    m, of the cylinders, root frame. `axis`: (3,), direction of their axis, not necessarily a unit vector. `length`: their length, m.
+    `place`: position of the element in the tree of the file. Raises RobotFileError if the element is not valid.
     """
     for attribute, role in (("radius", "solid"), ("field", "field")):
         if node.number(attribute, 0.0) == 0:
@@ -84,8 +84,8 @@ def read_skeleton(node: Node, draft: Draft, place: Place, centre: Array, axis: A
 def read_shape(node: Node, draft: Draft, place: Place) -> None:
     """Read a <sphere>, <capsule>, <cylinder>, <box> or <convex>, and add its solid or field to `draft`, the robot read so far.
 
-    A field, a shape with the attribute `field`, is a volume that causes a repulsive force. Raises RobotFileError if the element is not
-    valid.
+    A field, a shape with the attribute `field`, is a volume that causes a repulsive force. `place`: position of the element in the
+    tree of the file. Raises RobotFileError if the element is not valid.
     """
     volume = read_convex(node) if node.tag == "convex" else read_volume(node)
     name = node.optional("name") or free_name(draft, f"{draft.links[place.link]}_{node.tag}")
@@ -102,7 +102,8 @@ def read_shape(node: Node, draft: Draft, place: Place) -> None:
 def add_shape(node: Node, draft: Draft, shape: Shape, place: Place) -> None:
     """Add a shape to `draft`, the robot read so far; raises RobotFileError if there are too many shapes.
 
-    The line of `node` in the file, the index of the current element and whether the shape belongs to the base are recorded too.
+    The line of `node` in the file, the index of the current element, and whether the shape belongs to the base are recorded too.
+    `place`: position of the element in the tree of the file.
     """
     if len(draft.shapes) >= MOST_SHAPES:
         node.fail("size of the file", f"more than {MOST_SHAPES} shapes", "Join small shapes, or leave out what nothing can touch")
@@ -127,7 +128,7 @@ def read_marker(node: Node, draft: Draft, place: Place) -> None:
     """Read a <marker> and add it to `draft`, the robot read so far; raises RobotFileError if it is not valid.
 
     Without a normal in the file the normal is the z axis of the marker's rotation, or +x if there is no rotation either. Without a
-    rotation in the file it is the smallest rotation that turns z to the normal.
+    rotation in the file it is the smallest rotation that turns z to the normal. `place`: position of the <marker> in the tree of the file.
     """
     name = node.text("name")
     if name in draft.markers:

@@ -20,8 +20,8 @@ NARROWEST = 1e-6  # deg or m between the limits of a motor
 class MotorDraft:
     """A motor as written in its element, before its joints are known.
 
-    `part`: name of its part. `index`: its position within the part. `low`, `high`, `home`: limits and home, in m if `in_metres`, else in
-    degrees.
+    `part`: name of its part. `index`: its attribute idx, which determines the order of the motors within the part. `low`, `high`, `home`:
+    limits and home, in m if `in_metres`, else in degrees.
     """
 
     node: Node
@@ -41,7 +41,7 @@ class MotorDraft:
 def read_motor(node: Node, part: str, count: int) -> MotorDraft:
     """Return the motor that a <motor> element describes; raises RobotFileError if it is not valid.
 
-    `part`: name of its part. `count`: number of motors before it in the file, its index if the element has no idx.
+    `part`: name of the motor's part. `count`: number of motors, of all parts, before it in the file: its index if the element has no idx.
     """
     low, high = node.number("minPos"), node.number("maxPos")
     unit = node.choice("unit", node.optional("unit") or UNITS[0], UNITS, "unit")

@@ -259,7 +259,7 @@ SPELLING = {"zeropositionkinematictree": "ZeroPositionKinematicTree", "constrain
 def tree_of(node: Node) -> ET.Element:
     """Return a node that was read, with all elements inside it, as an ElementTree element.
 
-    A Node has its tag in lower case; the result has the upper and lower case of the grammar, as in ZeroPositionKinematicTree.
+    A Node has its tag in lower case; the result has the tags as in robot and world files, such as ZeroPositionKinematicTree.
     """
     root = ET.Element(SPELLING.get(node.tag, node.tag), node.attributes)
     waiting = [(node, root)]

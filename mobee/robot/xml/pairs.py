@@ -107,11 +107,11 @@ def ignore_elements(robot: Robot) -> list[ET.Element]:
 
 
 def role_elements(robot: Robot, role: str, pairs: Ints, own: bool) -> list[ET.Element]:
-    """Return the <ignore> elements for the pairs of shapes of one role that are not tested, without the pairs of links in `robot.untested`.
+    """Return the <ignore> elements for the pairs of shapes of one role that are not tested for contacts.
 
-    `role`: "solid", or "field", a volume that causes a repulsive force. `pairs`: (p, 2) indices of shapes, the pairs that are tested.
-    `own`: True: the reader of the file tests fields of one part with each other, unless an <ignore> element excludes them. False: it never
-    tests them, so that they need no <ignore> elements.
+    The pairs of links in `robot.untested` are left out. `role`: "solid", or "field", a volume that causes a repulsive force. `pairs`:
+    (p, 2) indices of shapes, the pairs that are tested. `own`: True: the reader of the file tests fields of one part with each other,
+    unless an <ignore> element excludes them. False: it never tests them, so that they need no <ignore> elements.
     """
     chosen = np.array([k for k, shape in enumerate(robot.shapes) if shape.role == role], dtype=np.intp)
     link = np.array([robot.shapes[k].link for k in chosen], dtype=np.intp)

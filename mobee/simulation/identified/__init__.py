@@ -24,9 +24,9 @@ def identified_robots() -> tuple[str, ...]:
 def load_identified(robot_name: str, motors: Sequence[str] | None = None) -> dict[str, Any]:
     """Return a dict from the names of arguments of `MotorParameters` to the identified values for a robot.
 
-    They are lag [s], delay [s], backlash [rad] and friction [rad/s], each (n,), and encoder_noise [rad]. `motors`: names of the robot's
-    motors, which give the order; None: the order of the file. Raises UnknownName for a robot that has not been identified, and InvalidValue
-    if the file has other motors.
+    They are lag [s], delay [s], backlash [rad] and friction [rad/s], each (n,) for n motors, and encoder_noise [rad]. `motors`: names of
+    the robot's motors, in the order that the arrays will have; None: the order of the file. Raises UnknownName for a robot that has not
+    been identified, and InvalidValue if the file has other motors.
     """
     if robot_name not in (known := identified_robots()):
         raise UnknownName("identified robot", robot_name, known)

@@ -71,7 +71,7 @@ class Calibration:
         x: (P,) the parameters in the order of `names`; m, rad and s.
         covariance: (P, P) of x.
         prior: (P,) standard deviations of the parameters before the calibration.
-        misfit: mean squared residual, in standard deviations; 1 if noise and model are as assumed.
+        misfit: mean square of the residuals, each divided by its assumed standard deviation; 1 if noise and model are as assumed.
         uncalibrated: distances of the observed tag from its predicted position, with all parameters 0.
         calibrated: distances of the observed tag from its predicted position, with the parameters x.
         unobservable: directions of the parameters that the pictures do not determine.

@@ -162,7 +162,7 @@ class SelfCalibratingPlant:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The settings of the plant as plain JSON values; empty if the plant has none."""
+        """The settings of the corrected plant (the argument `plant`) as plain JSON values; empty if it has none."""
         return self.plant.settings if isinstance(self.plant, Described) else {}
 
     @property
@@ -175,11 +175,12 @@ class SelfCalibratingPlant:
         return self.plant.measure(part) + self._of(part)
 
     def act(self, part: str, target: Array) -> Outcome:
-        """Set the part's attractor and wait until the part settles or times out; return the outcome, with corrected positions.
+        """Move the part to a target and wait until it settles or times out; return the outcome, with corrected positions.
 
-        `target`: (n_part,) rad in corrected values, which must be within the motors' limits. The plant gets the target minus the offsets; a
-        value of this difference beyond a limit is replaced by the limit. Raises InvalidValue for a target beyond the limits, or that the
-        plant refuses, and ActionInterrupted if a hold (a safe stop), a fault or a restart of the robot ends the action.
+        `target`: (n_part,) rad, the attractor (the pose to which the controller pulls the part) in corrected values, which must be within
+        the motors' limits. The plant gets the target minus the offsets; a value of this difference beyond a limit is replaced by the limit.
+        Raises InvalidValue for a target beyond the limits, or that the plant refuses, and ActionInterrupted if a hold (a safe stop), a
+        fault or a restart of the robot ends the action.
         """
         offsets = self._of(part)
         if offsets.any():
@@ -193,16 +194,16 @@ class SelfCalibratingPlant:
         return self._corrected(part, outcome)
 
     def present(self, target: ReachTarget | None) -> None:
-        """Show the plant the target of the next reach; None: remove the target."""
+        """Set the target of the next reach; None: remove the target."""
         self.plant.present(target)
         self._target = target
 
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
         """Reach with a marker of the part to the presented target; return the outcome, with corrected positions.
 
-        `stay`: True: the part stays in the pose in which the force ended; False: the attractor pulls it back. Raises InvalidValue if there
-        is no target. It is also raised if an offset is not 0 and the target prescribes a direction of the marker's normal
-        (`ReachTarget.normal` or `faces`): this direction is not corrected.
+        `stay`: True: the part stays in the pose in which the force ended; False: it returns to the target of its last action. Raises
+        InvalidValue if there is no target. It is also raised if an offset is not 0 and the target prescribes a direction of the marker's
+        normal (`ReachTarget.normal` or `faces`): this direction is not corrected.
         """
         if self._target is None:
             raise InvalidValue("no target is presented; call present(ReachTarget(position)) first")

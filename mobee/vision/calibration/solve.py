@@ -199,9 +199,9 @@ def _quality(rig: Rig, problem: _Problem, observations: Sequence[Observation], x
 
 
 def tag_centre(rig: Rig, x: Array, one: Observation) -> Array:
-    """Return the position (3,) m, root frame, of the middle of the tag according to the encoders of an observation.
+    """Return the position (3,) m, root frame, of the middle of the hand's tag according to the encoders of an observation.
 
-    `x`: (P,) the calibration's parameters.
+    The tag is an AprilTag on the palm. `x`: (P,) the calibration's parameters.
     """
     assert rig.tag is not None
     link, position, rotation = rig.tag.frame(rig.robot)

@@ -38,7 +38,7 @@ class TrackSettings(Settings):
         moves_for: s, time for which an object that has moved counts as moving.
         turn: rad, rotation of the gaze after which the bias of the cameras has mostly changed.
         forget_after: s, time after which an object that was not seen again loses its name.
-        most: largest number of objects of each thing that get a name.
+        most: largest number of objects of each `Thing` (kind of object, with shape, size and colour) that get a name.
     """
 
     hits: Annotated[int, Range(ge=1, le=100)] = 3
@@ -114,7 +114,7 @@ class Track:
 
     @property
     def covariance(self) -> Array:
-        """The covariance (3, 3) m^2 of the position at time `t`."""
+        """The covariance (3, 3) m^2 of the position at time `t`, along the axes of the root frame."""
         return self._spread[P, P].copy()
 
     @property
@@ -127,7 +127,7 @@ class Track:
 
     @property
     def size(self) -> Array:
-        """The lengths (g,) m of the shape, averaged over the looks (pairs of pictures taken at the same time)."""
+        """The g lengths (g,) m of the shape, in the order of `Thing.size`, averaged over the looks (pairs of pictures of the same time)."""
         return self._size.copy()
 
     @property

@@ -222,8 +222,9 @@ NAMES = (*REGRESSIONS, CORRECTED)
 def localiser(name: str, rig: Rig, seed: int) -> Localiser:
     """Return a new localiser by its name, one of NAMES: a regression of REGRESSIONS, or "corrected stereo".
 
-    `rig`: the robot and its cameras; a regression uses only the lens. `seed`: of the regression. Raises UnknownName for another name. All
-    regressions except "genetic programming" need scikit-learn: if it is not installed, their method `fit` raises NotInstalled.
+    `rig`: the robot and its cameras; a regression uses only the lens. `seed`: seed of the regression's random numbers. Raises UnknownName
+    for another name. All regressions except "genetic programming" need scikit-learn: if it is not installed, their method `fit` raises
+    NotInstalled.
     """
     if name == CORRECTED:
         return CorrectedStereo(rig)

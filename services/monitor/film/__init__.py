@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Makes films of runs: draws the frames in the style of the page, and writes the files."""
+"""Makes films of runs: draws the frames in the style of the monitor's web page, and writes the video files."""

@@ -56,9 +56,10 @@ def scene_times(length: float) -> list[float]:
 
 
 def first_complete_moment(story: Story) -> float:
-    """Return the first time [s since the begin] at which all agents act and the objects of the world are known.
+    """Return the first time [s since the begin of the record] at which all agents perform actions and the objects of the world are known.
 
-    Returns 0 if this is later than a tenth of the record's length.
+    A condition that is never met in the record is ignored. Returns 0 if the time is later than a tenth of the record's duration, or if no
+    agents were recorded. `story`: the record of the run.
     """
     cards, objects = story.tracks.get("cards"), story.tracks.get("objects")
     if cards is None:

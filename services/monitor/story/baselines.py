@@ -30,7 +30,7 @@ state-action is predictable if it was tried at least twice, with the same outcom
 
 @dataclass(frozen=True, eq=False)
 class Outcomes:
-    """The possible outcomes of all state-actions.
+    """The possible outcomes of all state-actions: S states, A actions of each state, at most B outcomes of each state-action.
 
     `states`: next states of each state-action, (S, A, B); a state-action with fewer than B outcomes has further entries of probability 0.
     `cumulative`: their cumulative probabilities along the last axis, (S, A, B).
@@ -71,8 +71,8 @@ def baselines(outcomes: Outcomes, exists: NDArray[np.bool_], start: int, transit
 
     A learning curve is the mean of 4 simulations. It is a list of points (number of transitions, share of the state-actions that were
     tried, share of the state-actions that are predictable), as defined at `Curve`. `outcomes`: the possible outcomes of all state-actions,
-    with their probabilities. `exists`: (S, A), True where the state has the action. `start`: state in which every simulation begins.
-    `transitions`: length of each simulation; more than LONGEST (10 000) transitions are not simulated.
+    with their probabilities. `exists`: (S, A), by state and action, True where the state has the action. `start`: state in which every
+    simulation begins. `transitions`: length of each simulation; more than LONGEST (10 000) transitions are not simulated.
     """
     transitions = min(transitions, LONGEST)
     rng = np.random.default_rng(SEED)

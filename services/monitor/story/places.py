@@ -72,6 +72,8 @@ def base_link(robot: Robot, part: str) -> int:
 def places(space: Space, spot: Spot, q: Array) -> Array:
     """Return the position of `spot` in each state, (S, 3) m, in the frame of the link on which the part is mounted.
 
+    This frame is the root frame at zero pose, and moves with the link.
+
     `q`: posture of the whole robot, (n,) rad; the part's own motors are replaced by the motor positions of each state.
     """
     robot, part = space.robot, space.robot.part(space.part)

@@ -28,8 +28,8 @@ def drawn(
     """Return a shape as a Rerun component, filled with a colour.
 
     `size` [m]: (radius,) of a sphere, (radius, length) of a cylinder or of a capsule without its caps, three edge lengths of a box.
-    `position`: centre, (3,) m. `rotation`: (3, 3). `color`: red, green, blue, opacity, 0 to 255. `vertices`: (v, 3) m in the frame of the
-    shape, for kind "convex" only.
+    `position` (3,) m, of the centre, and `rotation` (3, 3): in the frame of the Rerun entity. `color`: red, green, blue, opacity, 0 to 255.
+    `vertices`: (v, 3) m in the frame of the shape, for kind "convex" only.
     """
     w, x, y, z = quaternion_from_matrix(rotation)
     turns, colors, fill = [rr.Quaternion(xyzw=[x, y, z, w])], [color], rr.components.FillMode.Solid
@@ -142,7 +142,8 @@ class Figure:
     def move(self, begin: float, rate: float, poses: Array) -> None:
         """Log a motion of the robot with its contacts.
 
-        `poses`: (k, n) rad; the first one is at the time `begin` [s], the others follow with `rate` poses per second.
+        `poses`: (k, n) rad; the first one is at the time `begin` [s] of the stream's timeline, the others follow with `rate` poses
+        per second.
         """
         times = begin + np.arange(len(poses)) / rate
         transforms = link_transforms(self._robot, poses)
@@ -162,7 +163,7 @@ class Figure:
         self._columns(["plots", "motors"], times, rr.Scalars.columns(scalars=shares.ravel()).partition([len(low)] * len(poses)))
 
     def say(self, begin: float, text: str) -> None:
-        """Log a text as an event at the time `begin` [s]."""
+        """Log a text as an event at the time `begin` [s] of the stream's timeline."""
         self._stream.set_time(TIMELINE, duration=begin)
         self._stream.log("events", rr.TextLog(text, level="INFO"))
 

@@ -59,9 +59,10 @@ class Plots:
         self._stream.log("plots/forces", rr.Scalars(list(self._strengths.values())))
 
     def log_transition(self, part: str, seen: Transition) -> None:
-        """Log the reward [nats], the value and the number of a transition; nothing for a part without a plot.
+        """Log the reward, the value of the state before the action, and the number of a transition; nothing for a part without a plot.
 
-        The agent's transitions are numbered from 1 in the order of time.
+        The reward of a curious agent is in nats; that of a reaching agent is 0, or the penalty of a failure. The agent's
+        transitions are numbered from 1 in the order of time.
         """
         if part not in self._parts:
             return

@@ -68,7 +68,7 @@ def _surface(one: LinkSolid, parts: Sequence[str]) -> Surface:
 
 
 def encoded(surfaces: Sequence[Surface]) -> bytes:
-    """Encode surfaces as the bytes that the page reads, all little-endian.
+    """Encode surfaces as the bytes that the monitor's web page reads, all little-endian.
 
     Order: length of the header in bytes (uint32); the header; then for each surface its vertices and normals (float32) and triangles
     (uint32). The header is a JSON list, padded with spaces: for each surface its link, part and colour, and how many vertices and triangles

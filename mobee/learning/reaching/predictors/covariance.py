@@ -39,8 +39,8 @@ _NOISE, _PLACE, _PLACE_L, _APPROACH, _APPROACH_L, _APPROACH_J, _DISTANCE, _DISTA
 class Points:
     """The features of n reaches that the covariance function needs.
 
-    `state`: (n,) where each reach starts. `target`: (n, 3) m, root frame. `vector`: (n, 3) m, from the hand to the target. `remaining`:
-    (n,) m, the distance that remains after the reach according to the `LinearArm`.
+    `state`: (n,) number of the state in which each reach starts. `target`: (n, 3) m, root frame. `vector`: (n, 3) m, from the hand to the
+    target. `remaining`: (n,) m, the distance that remains after the reach, as `LinearArm` (a linear arm with springs) predicts it.
     """
 
     state: Ints
@@ -50,7 +50,10 @@ class Points:
 
 
 def points(arm: LinearArm, state: Ints, target: Array) -> Points:
-    """Return the features of reaches from states (n,) for targets (n, 3) [m], or for one target (3,) [m], root frame."""
+    """Return the features of reaches from states (n,) for targets (n, 3) [m], or for one target (3,) [m], root frame.
+
+    `arm`: predicts the distances that remain after the reaches, and has the positions of the hand in the states.
+    """
     targets = np.broadcast_to(target, (len(state), 3))
     vector = targets - arm.reaches.hands[state]
     return Points(state, targets, vector, arm.remaining(state, vector))
@@ -115,9 +118,9 @@ class Covariance:
     def with_slopes(self, a: Points, count: Array, scales: Array) -> tuple[Array, Slopes]:
         """Return the covariance (n, n) of the average rewards of n reaches, and a function that computes its derivatives.
 
-        `a`: the reaches. `count`: (n,) number of tries over which the reward of each reach is averaged. `scales`: (n, n) from
-        `worlds.scales_of`. The function takes weights (n, n). It returns the derivatives (8 + d,) of the sum of weights times covariance
-        with respect to the logarithms of the parameters.
+        `a`: the reaches. `count`: (n,) number of tries over which the reward of each reach is averaged. `scales`: (n, n) factors on the
+        covariances of the mean rewards; 1, or more for two reaches in the same earlier world (`worlds.scales_of`). The function takes
+        weights (n, n). It returns the derivatives (8 + d,) of the sum of weights times covariance by the logarithms of the parameters.
         """
         value, pair = self._value, np.ix_(a.state, a.state)
         place_far = _squared(a.target, a.target) / value[_PLACE_L] ** 2
@@ -170,8 +173,9 @@ MAX_STEPS = 40  # of the search
 def fitted_pairs(reached: Reached) -> Ints:
     """Return the indices, ascending, of the pairs of state and target that a fit uses: at most MAX_FITTED (500).
 
-    Pairs of the newest world are chosen first; pairs of all other worlds fill the remaining number. If one of these two groups has too many
-    pairs, evenly spaced ones are chosen from it, in the order of their first reaches.
+    Pairs of the newest world (the surroundings and the robot of the newest reaches) are chosen first; pairs of all other worlds fill the
+    remaining number. If one of these two groups has too many pairs, evenly spaced ones are chosen from it, in the order of their first
+    reaches.
     """
     newest = reached.world == reached.world.max(initial=0)
     chosen: list[Ints] = []
@@ -192,11 +196,12 @@ def negative_log_posterior(
 
     Args:
         logs: (8 + d,) logarithms of the parameters.
-        arm: gives the features of the reaches.
+        arm: gives the features of the reaches (`points`).
         squares: (d, S, S) scaled squared differences of d joints between S states, from `joint_squares`.
         reached: the n pairs of state and target that were tried, with their rewards.
         expected: (n,) prior mean reward of each pair.
-        factors: (W,) how much each world differs from the present one, see `worlds.scales_of`.
+        factors: (W,) for each of W worlds (in which reaches were made) how much its rewards differ from those of the present one, 0: not at
+            all; see `worlds.scales_of`.
     """
     from scipy.linalg import cho_factor, cho_solve
 
@@ -220,9 +225,10 @@ def negative_log_posterior(
 def fitted_parameters(logs: Array, arm: LinearArm, squares: Array, reached: Reached, expected: Array, factors: Array = ONE_WORLD) -> Array:
     """Return the logarithms of the covariance parameters with the highest posterior, (8 + d,), by a local search.
 
-    `logs`: (8 + d,), where the search begins, for d joints. `arm`: gives the features of the reaches. `squares`: (d, S, S), from
-    `joint_squares`. `reached`: the n pairs of state and target that were tried, with their rewards. `expected`: (n,) prior mean reward of
-    each pair. `factors`: (W,) how much each world differs from the present one, see `worlds.scales_of`.
+    `logs`: (8 + d,), where the search begins, for d joints. `arm`: gives the features of the reaches (`points`). `squares`: (d, S, S) for S
+    states, from `joint_squares`. `reached`: the n pairs of state and target that were tried, with their rewards. `expected`: (n,) prior
+    mean reward of each pair. `factors`: (W,) for each of W worlds (in which reaches were made) how much its rewards differ from those of
+    the present one, 0: not at all; see `worlds.scales_of`.
     """
     from scipy.optimize import minimize
 

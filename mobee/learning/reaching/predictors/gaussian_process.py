@@ -194,7 +194,10 @@ class GaussianProcess:
         return {"name": "gp", "before": "linear arm", "refits": list(self._refits)}
 
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:
-        """Learn from the reward of a reach that began in `state`, for a target (3,) m. `expected` is not used."""
+        """Learn from the reward of a reach that began in `state`, for a target (3,) m, root frame.
+
+        `state`: number of the state. `expected` (the reward that `mean` predicted) is not used.
+        """
         world = len(self._factors) - 1
         if self._reached.pair(state, target, world) is not None:
             self._repeats += 1
@@ -218,16 +221,16 @@ class GaussianProcess:
         self._here, self._next = 0, 1.0
 
     def mean(self, target: Array) -> Array:
-        """Return the expected reward of a reach from each state for a target (3,) m, shape (S,)."""
+        """Return the expected reward of a reach from each of the S states for a target (3,) m, root frame: shape (S,)."""
         return self._prior_mean(target) + self._about(target)[0]
 
     def deviation(self, target: Array) -> Array:
-        """Return the standard deviation of the mean reward of a reach from each state for a target (3,) m, shape (S,)."""
+        """Return the standard deviation of the mean reward of a reach from each of the S states for a target (3,) m, root frame: (S,)."""
         deviation: Array = np.sqrt(np.maximum(self._about(target)[1].diagonal(), 0.0))
         return deviation
 
     def sample(self, target: Array, rng: np.random.Generator) -> Array:
-        """Return a random sample from the joint posterior of the mean rewards of all states for a target (3,) m, shape (S,)."""
+        """Return a random sample (S,) from the joint posterior of the mean rewards of all S states for a target (3,) m, root frame."""
         mean, covariance = self._about(target)
         jitter = JITTER * self._covariance.prior * np.eye(len(mean))
         drawn: Array = self._prior_mean(target) + mean + np.linalg.cholesky(covariance + jitter) @ rng.standard_normal(len(mean))
@@ -273,11 +276,12 @@ class GaussianProcess:
 
 
 def thinned(known: Reached, most: int) -> tuple[Ints, Array, Array, Array, Ints]:
-    """Return state (n,), target (n, 3) m, average reward (n,), number of tries (n,) and world (n,) of the pairs of state and target.
+    """Return state (n,), target (n, 3) m, average reward (n,), number of tries (n,) and world (n,) of the n pairs of state and target.
 
-    If there are more than `most` pairs, those of the same state and world whose targets lie in the same cell of a cubic grid are merged
-    into one pair with the average target and reward, weighted by the number of tries. The cells grow until at most `most` pairs remain, or
-    the largest cell (10 m) is reached; so at least one pair of each state and world remains.
+    States and worlds are numbers; targets are in the root frame. `known`: the reaches observed so far. If there are more than `most` pairs,
+    those of the same state and world whose targets lie in the same cell of a cubic grid are merged into one pair with the average target
+    and reward, weighted by the number of tries. The cells grow until at most `most` pairs remain, or the largest cell (10 m) is reached; so
+    at least one pair of each state and world remains.
     """
     state, world, raster, step = known.state, known.world, *RASTER
     which = np.arange(len(known))

@@ -42,7 +42,7 @@ class Kernel(Independent):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """A dict with the name of the predictor, {"name": "kernel_prior"} with `prior`, else {"name": "kernel"}."""
+        """A dict with the name of the predictor, {"name": "kernel_prior"} if `prior` is True, else {"name": "kernel"}."""
         return {"name": "kernel_prior" if self._prior else "kernel"}
 
     @property

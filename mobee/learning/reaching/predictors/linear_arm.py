@@ -26,7 +26,7 @@ class LinearArm:
     Args:
         reaches: the reach actions: the marker's position and Jacobian in each state. Without Jacobians the arm does not move, and the whole
             distance remains.
-        compliance: g of the springs, in rad/m^2.
+        compliance: g of the springs, in rad/m^2: in a state with the Jacobian J, a remaining error e [m] turns the joints by g J^T e.
         offset, slope: of the expected reward, see above.
     """
 

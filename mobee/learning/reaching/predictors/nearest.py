@@ -29,7 +29,7 @@ class Nearest(Independent):
     The weights are inverse squared distances; the average of all rewards has a small weight too. Repeated reaches count as one.
 
     Args:
-        reaches: the reach actions: the marker's position in each state.
+        reaches: for each state, the pose at which a reach begins, and the marker's position in this pose.
     """
 
     def __init__(self, reaches: Reaches) -> None:

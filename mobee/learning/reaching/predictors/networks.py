@@ -52,9 +52,9 @@ class Networks:
         return {"name": "networks", "seed": self._seed}
 
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:
-        """Learn from the reward of a reach that began in `state`, for a target (3,) m, and again from some earlier reaches.
+        """Learn from the reward of a reach that began in `state`, and again from some earlier reaches.
 
-        `expected` is not used.
+        `target`: (3,) m, root frame. `expected` is not used.
         """
         if self._tries == len(self._rewards):
             self._inputs, self._rewards = (np.concatenate([one, one]) for one in (self._inputs, self._rewards))
@@ -67,17 +67,23 @@ class Networks:
             self._descend()
 
     def mean(self, target: Array) -> Array:
-        """Return the expected reward of a reach from each state for a target (3,) m, shape (S,): the average of the networks."""
+        """Return the expected reward of a reach from each state for a target (3,) m, root frame; (S,), the average of the networks."""
         mean: Array = self._each(target).mean(axis=0)
         return mean
 
     def deviation(self, target: Array) -> Array:
-        """Return the standard deviation between the networks' predicted rewards of a reach from each state for a target (3,) m, (S,)."""
+        """Return the standard deviation between the networks' predicted rewards of a reach from each state, shape (S,).
+
+        `target`: (3,) m, root frame.
+        """
         deviation: Array = self._each(target).std(axis=0, ddof=1)
         return deviation
 
     def sample(self, target: Array, rng: np.random.Generator) -> Array:
-        """Return the rewards that one network, drawn at random, predicts for a reach from each state to a target (3,) m, shape (S,)."""
+        """Return the rewards that one network, drawn at random, predicts for a reach from each state, shape (S,).
+
+        `target`: (3,) m, root frame.
+        """
         drawn: Array = self._each(target)[rng.integers(NETWORKS)]
         return drawn
 

@@ -83,7 +83,8 @@ class Reached:
     def add(self, state: int, target: Array, reward: float, world: int = 0) -> int:
         """Record one reach that began in `state`, for a target (3,) m in the root frame, and its reward; return the index of its pair.
 
-        A pair is a state and a target in one world, which is given by its number. The first reach of a pair adds the pair at the end.
+        A pair is a state and a target in one world (the surroundings or the robot of the reach). `world`: number of the world. The first
+        reach of a pair adds the pair at the end.
         """
         key = target.tobytes()
         place = self._target_of.setdefault(key, len(self._target_of))
@@ -129,15 +130,18 @@ class Independent(ABC):
         self._reached.add(state, target, reward)
 
     def mean(self, target: Array) -> Array:
-        """Return the expected reward of a reach from each state for a target (3,) m, shape (S,)."""
+        """Return the expected reward of a reach from each state for a target (3,) m, root frame; shape (S,)."""
         return self._posterior(target)[0]
 
     def deviation(self, target: Array) -> Array:
-        """Return the standard deviation of the mean reward of a reach from each state for a target (3,) m, shape (S,)."""
+        """Return the standard deviation of the mean reward of a reach from each state for a target (3,) m, root frame; shape (S,)."""
         return self._posterior(target)[1]
 
     def sample(self, target: Array, rng: np.random.Generator) -> Array:
-        """Return a random sample of the mean reward of a reach from each state for a target (3,) m, shape (S,), drawn independently."""
+        """Return a random sample of the mean reward of a reach from each state, shape (S,); the states are drawn independently.
+
+        `target`: (3,) m, root frame.
+        """
         drawn: Array = rng.normal(*self._posterior(target))
         return drawn
 

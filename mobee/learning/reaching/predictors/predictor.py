@@ -53,7 +53,10 @@ class RewardPredictor(Protocol):
 
 @runtime_checkable
 class WorldComparer(Protocol):
-    """Additional interface of a predictor that estimates to what degree rewards from another world are valid in the present one."""
+    """Additional interface of a predictor that estimates to what degree rewards from another world are valid in the present one.
+
+    Worlds differ in their objects, such as obstacles, or in the robot.
+    """
 
     def begin_world(self) -> None:
         """Predict from now on for another world or another robot, in which all later reaches are made."""
@@ -75,7 +78,7 @@ SHRINKAGE = 0.1  # weight of the average of all rewards at each knot, in reaches
 
 
 def lengths(reaches: Reaches, target: Array) -> Array:
-    """Return the distance [m] between the hand in each state and a target (3,) m, shape (S,); for targets (T, 3), shape (S, T)."""
+    """Return the distance [m] between the hand in each state and a target (3,) m, root frame, shape (S,); for targets (T, 3), (S, T)."""
     far: Array = np.sqrt(((target - reaches.hands.reshape(-1, *[1] * (target.ndim - 1), 3)) ** 2).sum(axis=-1))
     return far
 

@@ -40,11 +40,11 @@ class Weighted:
         return {"name": "weighted", "scale": self._scale}
 
     def add(self, state: int, target: Array, reward: float, expected: float) -> None:
-        """Append the reward of a reach for a target (3,) m to the history of its state (thesis eq. 8.2). `expected` is not used."""
+        """Append the reward of a reach to the history of its state (thesis eq. 8.2). `target`: (3,) m, root frame; `expected`: unused."""
         self._rewards.add(state, target, reward)
 
     def mean(self, target: Array) -> Array:
-        """Return the expected reward of a reach from each state for a target (3,) m, shape (S,) (thesis eq. 8.5)."""
+        """Return the expected reward of a reach from each state for a target (3,) m, root frame; shape (S,), thesis eq. 8.5."""
         return self._rewards.average(target, 1.0)
 
     def deviation(self, target: Array) -> NoReturn:

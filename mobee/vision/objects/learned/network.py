@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The network of a learned detector: three convolutions, stored as ONNX with the things it was trained for, and run by OpenCV.
+"""The network of a learned detector: three convolutions, stored as ONNX with the kinds of objects it was trained for, and run by OpenCV.
 
 The first convolution has two inputs around each pixel: 5 x 5 adjacent pixels, which show the edge, and 5 x 5 pixels with a spacing of
 `APART` (5 pixels), which show the surroundings. The other two convolutions combine the results within each pixel.
@@ -38,7 +38,7 @@ Shares = Callable[[Picture], Floats]
 class Network:
     """A trained network.
 
-    `things`: the things for which it was trained, in the order of its outputs. `model`: the network as the bytes of an ONNX file.
+    `things`: the kinds of objects for which it was trained, in the order of its outputs. `model`: the network as the bytes of an ONNX file.
     """
 
     things: tuple[Thing, ...]
