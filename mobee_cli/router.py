@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`mobee router`: runs only the router, for systems whose services are started one by one, such as in containers."""
+"""`mobee router`: runs only the router of the bus, for services that are started one by one."""
 
 from __future__ import annotations
 

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks the shapes of a robot: fields that do not enclose their link's solids, reduced hulls larger than the exact ones, duplicates."""
+"""Checks the shapes of a robot.
+
+It finds fields (volumes that cause repulsive forces) that do not enclose the solids of their link, hulls with few corners that are much
+larger than the exact ones, and duplicates.
+"""
 
 from __future__ import annotations
 

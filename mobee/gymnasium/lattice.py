@@ -200,7 +200,9 @@ class LatticeEnv(Env[Any, Any]):
 
 
 class LatticeVectorEnv(RobotVectorEnv):
-    """Several robots on one lattice, whose actions are simulated together; results are bit-equal to those of separate `LatticeEnv`s.
+    """Several `LatticeEnv`s whose actions are simulated together: each robot moves between poses of a lattice in joint space.
+
+    Results are bit-equal to those of separate environments.
 
     In the step after the end of a robot's episode, its action is ignored and a new episode begins (`AutoresetMode.NEXT_STEP`).
 

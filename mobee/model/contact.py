@@ -47,8 +47,8 @@ class ContactTable:
     """A table of the contacts in a batch of poses, with one row for each of the c contacts, sorted by pose, kind, first and second.
 
     The columns are those of `mobee.model.contact.Contact`. Shapes and world objects are numbered: first the robot's shapes, then the
-    world's objects; `name` returns the name of a number. `shapes`, `objects`: their names. `rows`: the columns, as arrays or as bytes (see
-    `__init__`).
+    world's objects; `name` returns the name of a number. `shapes`, `objects`: their names. `rows`: two blocks
+    of columns, one of whole and one of real numbers, as arrays or as bytes (see `__init__`).
     """
 
     # A table is made for every pose and is often never read: its rows become arrays when they are first read.

@@ -241,7 +241,7 @@ class OfflinePlant:
     def act(self, part: str, target: Array, reaching: str | None = None) -> Outcome:
         """Set the part's attractor to `target` (n_part,) rad, run until the part has settled or timed out, and return the outcome.
 
-        `reaching`: name of a marker; during the action, targets exert no repulsive force on the hand that carries it, as in a reach. Raises
+        `reaching`: name of a marker; during the action, world objects with the role "target" do not repel the hand that carries it. Raises
         InvalidValue while another part is acting (then use `begin` and `advance`).
         """
         self._require_alone(part, "act")

@@ -66,7 +66,7 @@ class ModelForces:
         return abs(k - self.message.re_k) <= MAX_TICKS and all(age <= MAX_STATE_AGE for age in ages)
 
     def touched(self, part: str) -> list[str]:
-        """Return the names of the world objects in contact with a part, by the stored message."""
+        """Return the names of the world objects in contact with a part, as the newest message of the service `model` states them."""
         return self.message.touched.get(part, []) if self.message is not None else []
 
     @property

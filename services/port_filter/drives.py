@@ -62,8 +62,8 @@ class DriveServer:
     def hold(self, part: str) -> None:
         """Stop a part: ask robot_sim to put it in hold, in which it brakes and stands still.
 
-        If a client owns the part, it remains the owner, and must call arm before the part moves again. If no client owns the part, it is
-        released at robot_sim, so that any client may take it. If this call fails, a warning is logged.
+        If a client owns the part, it remains the owner, and must make the call `arm` before the part moves again. If no client owns the
+        part, it is released at robot_sim, so that any client may take it. If the call of robot_sim fails, a warning is logged.
 
         If robot_sim does not run, nothing is done, because at its start all parts stand still and have no owners.
         """

@@ -278,7 +278,7 @@ class Watch:
         self._deepest = SolidContact()
 
     def measure(self) -> None:
-        """Count contacts, stops and the states of the safety gates; call this once per tick, after the physics.
+        """Count contacts, stops of moving parts, and ticks in each state of the safety gates; call this once per tick, after the physics.
 
         If the physics gives positions that are not finite, all gates enter the state fault.
         """
