@@ -157,7 +157,8 @@ TIE_MARGIN = 1e-12  # scores that differ by less are a tie
 def curious(agent: Explorable, state: int, rng: np.random.Generator) -> Array:
     """Return the values (A,) of the actions of `state` in a plan for information gain (thesis Algorithm 8).
 
-    If the agent pursues a goal, the plan is for this goal instead. The value of an action is the expected discounted sum of rewards. `rng` is not used.
+    If the agent pursues a goal, the plan is for this goal instead. The value of an action is the expected discounted sum of rewards. `rng`
+    is not used.
     """
     return agent.plan()[1][state, : len(agent.model.space.actions(state))]
 
