@@ -334,7 +334,7 @@ class Controller:
 
     def _evaluated(self, q: Array) -> Pose:
         """Return the pose at q, without contacts of the hands that reach with targets."""
-        return self._track.evaluate(q, self._reaches.markers[:MAX_HANDS])
+        return self._track.evaluate(q, self._reaches.markers[:MAX_HANDS]) if self._reaches else self._track.evaluate(q)
 
     def _add_client(self, q: Array, total: Array) -> None:
         """Add f_config and f_work (thesis eqs. 5.9 and 5.10); for a motor that slides f_work is converted to its unit, as for a contact."""

@@ -141,7 +141,7 @@ MISTAKES = (
     # places and runs
     Mistake("reach --offline --target -0.3 0.2", ("argument --target: expected 3 arguments",)),
     Mistake("reach --offline --target nan 0 0", ("position (nan, 0, 0) of the target: must be three finite numbers, in m",)),
-    Mistake("reach --offline --target 0 0 0", ("(0, 0, 0) m is inside the robot's own torso_1", "the nearest to which")),
+    Mistake("reach --offline --target 0 0 0", ("(0, 0, 0) m is inside the robot's own root_link", "the nearest to which")),
     Mistake("reach --offline --target -3 2 1", ("The target is out of reach of right_arm", "with --target X Y Z"), 1),
     Mistake("reach --robot arm.urdf --target 1 0 0", ("--robot arm.urdf: only valid with --offline",)),
     Mistake("reach --offline --run run --target -0.3 0.2 0.1", ("no agent has learned to reach in this run yet",)),
