@@ -304,6 +304,7 @@ def prm(
 
     Raises:
         OmplMissing, InvalidValue, UnknownName: OMPL is not installed, or an argument is invalid; the message states the remedy.
+        MobeeError: 10 000 random poses, one after the other, are not valid.
     """
     return _grown("PRM", model, motors, milestones, neighbours, rest, seed, step)
 
@@ -332,6 +333,7 @@ def prm_star(
 
     Raises:
         OmplMissing, InvalidValue, UnknownName: OMPL is not installed, or an argument is invalid; the message states the remedy.
+        MobeeError: 10 000 random poses, one after the other, are not valid.
     """
     return _grown("PRMstar", model, motors, milestones, None, rest, seed, step)
 

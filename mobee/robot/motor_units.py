@@ -54,10 +54,10 @@ def motor_units(robot: Robot) -> Array:
 
 @per_robot
 def fine_units(robot: Robot) -> Array:
-    """Return for each motor the distance, in its own unit, by which a small quantity in rad is converted to that unit, (n,), read-only.
+    """Return for each motor the distance, in its own unit, that counts as 1 rad where a quantity is small, (n,), read-only.
 
-    Small quantities are the thresholds for rest, the backlash and the encoder noise: 1 rad of them counts as this distance. It is 1 rad
-    for a motor that turns, and for a slide FINE (0.25) times the length [m] of `mobee.robot.motor_units.motor_units`.
+    Small quantities are the thresholds for rest, the backlash and the encoder noise. The distance is 1 rad for a motor that turns, and for
+    a slide FINE (0.25) times the length [m] of `mobee.robot.motor_units.motor_units`.
     """
     units = np.array(
         [unit * (FINE if slides(robot, motor) else 1.0) for unit, motor in zip(motor_units(robot), robot.motor_table, strict=True)]
