@@ -269,7 +269,7 @@ def go_to_pre_reach(agent: ReachAgent, target: ReachTarget) -> tuple[tuple[int, 
         if not plan.actions:
             break
         expected = np.maximum(agent.predictor.mean(target.position), 0.0)
-        values, _ = agent.planning.values(expected, agent.failures.rewards(target.position))
+        values, _ = agent.planning.values(expected, agent.failures.rewards(target.position, float(expected.max())))
         action = plan.actions[0]
         _, following = move(agent.plant, agent.space, state, action)
         if has_failed(values, state, following):

@@ -167,8 +167,8 @@ class ReachStream:
             publish_transition(self._transitions, self._agent.space, self._count, step, float(values[step.s]), believed)
 
         def numbers() -> tuple[Array, Array]:
-            value = action_values[:, :-1]
-            return np.where(np.isneginf(value), value, self._agent.failures.rewards(target.position)), value
+            value, best = action_values[:, :-1], float(action_values[:, -1].max())
+            return np.where(np.isneginf(value), value, self._agent.failures.rewards(target.position, best)), value
 
         self._learned.put(self._count, step.s_next, numbers)
 

@@ -171,7 +171,7 @@ class Course:
             target, asked = self._where(), time.process_time()
             worth = np.maximum(self._worth(target), 0.0)
             worth[self._spent] = 0.0
-            values, action_values = self._agent.planning.values(worth, self._failures.rewards(target))
+            values, action_values = self._agent.planning.values(worth, self._failures.rewards(target, float(worth.max())))
             action = choose(action_values[self._state], self._rng)
             self.thinking += time.process_time() - asked
             if action == space.goals.shape[1]:

@@ -109,7 +109,7 @@ class _Trial:
         agent, position = self.agent, target.position
         agent.plant.present(target)
         expected = np.maximum(agent.predictor.mean(position), 0.0)
-        values, action_values = agent.planning.values(expected, self.failures.rewards(position))
+        values, action_values = agent.planning.values(expected, self.failures.rewards(position, float(expected.max())))
         for _ in range(agent.limit):
             found.actions[at] += 1
             action = choose(action_values[self.state], self.rng)
@@ -127,4 +127,4 @@ class _Trial:
             self.state = following
             if failed:
                 found.failures[at] += 1
-                values, action_values = agent.planning.values(expected, self.failures.rewards(position))
+                values, action_values = agent.planning.values(expected, self.failures.rewards(position, float(expected.max())))

@@ -24,6 +24,7 @@ LENGTH_SCALE = 0.08  # m, of vectors from hand to target
 JOINT_SCALE = 0.4  # of the joints, in units of the spread of a joint's samples
 PRIOR_WEIGHT = 0.5  # of the overall failure rate, in transitions
 MAX_COST = 0.4  # reward lost by a transition that is certain to fail by its similar ones
+MAX_SHARE = 0.5  # of the best expected reward, lost by such a transition after a change of the world
 MAX_CACHED = 256  # targets whose sums are in memory
 
 
@@ -81,15 +82,19 @@ class AlikeFailures:
         self._used += 1
         self._failed += reward < 0.0
 
-    def rewards(self, target: Array) -> Array:
+    def rewards(self, target: Array, best: float = np.inf) -> Array:
         """Return the expected reward of each transition while the agent tries to reach a target, shape (S, A), at most 0.
 
-        `target`: position (3,) m, root frame.
+        `target`: position (3,) m, root frame. `best`: not used.
         """
+        return self.limited(target, MAX_COST)
+
+    def limited(self, target: Array, max_cost: float) -> Array:
+        """Return the result of `rewards`, if a transition that is certain to fail by its similar ones has the reward -max_cost."""
         usual = self._failed / (self._used + 1.0)
         failed, weight = self._alike(target)
         more = (failed + PRIOR_WEIGHT * usual) / (weight + PRIOR_WEIGHT) - usual
-        worth: Array = np.maximum(more, 0.0) * (-MAX_COST / (1.0 - usual))
+        worth: Array = np.maximum(more, 0.0) * (-max_cost / (1.0 - usual))
         tried = self._own.get(target.tobytes())
         if tried:
             sums = np.array(list(tried.values()))
@@ -153,12 +158,16 @@ class Failures:
         """
         self._histories.add(state * self._shape[1] + action, target, reward)
 
-    def rewards(self, target: Array) -> Array:
+    def rewards(self, target: Array, best: float = np.inf) -> Array:
         """Return the expected reward of each transition while the agent tries to reach a target, shape (S, A), at most 0.
 
-        `target`: position (3,) m, root frame.
+        `target`: position (3,) m, root frame. `best`: not used.
         """
         return self._histories.average(target, 0.0).reshape(self._shape)
+
+    def limited(self, target: Array, max_cost: float) -> Array:
+        """Return the result of `rewards`; `max_cost`: not used, because this memory learns nothing from similar transitions."""
+        return self.rewards(target)
 
     def copy(self) -> Failures:
         """Return a copy; later calls of `add` change only one of the two."""
@@ -228,16 +237,19 @@ class FailuresSinceChange:
         _, count, failed = self._own.get(transition, (0.0, 0, 0))
         return float((failed + self._alike()[transition]) / (count + 1.0))
 
-    def rewards(self, target: Array) -> Array:
+    def rewards(self, target: Array, best: float = np.inf) -> Array:
         """Return the expected reward of each transition while the agent tries to reach a target, shape (S, A), at most 0.
 
-        `target`: position (3,) m, root frame.
+        `target`: position (3,) m, root frame. `best`: largest expected reward of a reach for this target, over all states. After a change,
+        a transition that only resembles failed ones costs at most half of it: where all rewards are small, a larger cost would separate the
+        agent from states that it can reach.
         """
-        usual = self._usual.rewards(target)
         if not self._changed:
-            return usual
+            return self._usual.rewards(target)
+        max_cost = min(MAX_COST, MAX_SHARE * best)
+        usual = self._usual.limited(target, max_cost)
         rate = self._failed / (len(self._since) + 1.0)
-        worth: Array = np.maximum(self._alike() - rate, 0.0) * (-MAX_COST / (1.0 - rate))
+        worth: Array = np.maximum(self._alike() - rate, 0.0) * (-max_cost / (1.0 - rate))
         if self._own:
             sums = np.array(list(self._own.values()))
             worth[list(self._own)] = sums[:, 0] / (1.0 + sums[:, 1])

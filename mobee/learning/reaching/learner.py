@@ -156,7 +156,7 @@ class ReachLearner:
         if self._plan is None:
             if self._worth is None:
                 self._worth = self._strategy.rewards(self._target, self._draws_of_try.at(self.seed, self.tries))
-            self._plan = self.planning.values(self._worth, self.failures.rewards(self._target))
+            self._plan = self.planning.values(self._worth, self.failures.rewards(self._target, float(self._worth.max())))
         return self._plan
 
     def decide(self, state: int) -> int:

@@ -156,7 +156,7 @@ class ReachAgent(ReachLearner):
         """Plan a reach for a target from a state (None: from the present one), without moving or learning."""
         expected = np.maximum(self.predictor.mean(target.position), 0.0)
         start = self.state if state is None else state
-        return plan_reach(self.space, self.planning, expected, self.failures.rewards(target.position), start)
+        return plan_reach(self.space, self.planning, expected, self.failures.rewards(target.position, float(expected.max())), start)
 
     def evaluate(self, problems: Sequence[ReachTarget], repetitions: int = 1) -> Evaluation:
         """Try every problem in each repetition with what was learned so far, and return the results (thesis 8.3.3).

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from mobee.learning.reaching.changes import RewardScale, RunLength
-from mobee.learning.reaching.failures import FailuresSinceChange, failures_of
+from mobee.learning.reaching.failures import MAX_COST, FailuresSinceChange, failures_of
 from mobee.learning.reaching.predictors import Reaches
 from mobee.learning.reaching.store import ReachStore
 from mobee.learning.reaching.tabular import ReachTable
@@ -81,6 +81,21 @@ def test_failures_without_the_target_count_for_all_targets_after_a_change():
     assert failures.rewards(THERE)[0, 2] > other.rewards(THERE)[0, 2]
     failures.change(0)
     assert failures.rewards(THERE).tolist() == usual.rewards(THERE).tolist()
+
+
+@pytest.mark.parametrize(("best", "limit"), [(0.1, 0.5 * 0.1), (0.8, MAX_COST), (np.inf, MAX_COST)])
+@pytest.mark.parametrize("kind", ["alike", "local"])
+def test_after_a_change_doubt_costs_at_most_half_of_the_best_reward(kind, best, limit):
+    failures = FailuresSinceChange(SPACE, REACHES, failures_of(SPACE, REACHES, kind))
+    for _ in range(20):
+        failures.add(0, 0, HERE, -10.0, ())
+        failures.add(80, 0, HERE, 0.0, ())
+    np.testing.assert_array_equal(failures.rewards(HERE, best), failures.rewards(HERE))  # no change yet
+    failures.change(40)
+    found = failures.rewards(HERE, best)
+    assert found[0, 0] == pytest.approx(-200.0 / 21.0)  # what failed itself is no doubt
+    found[0, 0] = 0.0
+    assert -limit <= found.min() < -0.1 * limit
 
 
 OPTIONS = {"predictor": "nearest", "strategy": "ucb", "failures": "alike"}
