@@ -16,7 +16,7 @@ from mobee_cli.connect import add_endpoint, connected
 from mobee_cli.errors import UserError
 from services.common import rpc
 from services.common.bus import Bus
-from services.common.emergency_stop import StopRecord
+from services.common.emergency_stop import StopRecord, StopSender
 from services.common.exit_codes import ENVIRONMENT
 from services.common.observe import Received, alive, listen
 
@@ -35,15 +35,17 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.reset:
         _release(arguments.endpoint)
         return 0
-    recorded = _recorded(arguments.endpoint, arguments.reason)  # before the connection, which may take long in a flood
-    try:
-        with connected(arguments.endpoint, _CONNECT_PATIENCE) as session:
-            parts = _stop(session, arguments.reason)
-    except UserError as error:
-        if recorded and error.code == ENVIRONMENT:  # there is no router
-            kept = "The stop is recorded: robot_sim obeys the record if it still runs, and comes up stopped if it does not."
-            raise UserError(f"{error} {kept}", ENVIRONMENT) from None
-        raise
+    reason = arguments.reason[:2000]
+    recorded = _recorded(arguments.endpoint, reason)  # before the connection, which may take long in a flood
+    with StopSender(arguments.endpoint, "mobee", reason) as sender:
+        sender.send()
+        try:
+            with connected(arguments.endpoint, _CONNECT_PATIENCE) as session:
+                parts = _stop(session, sender, reason)
+        except UserError as error:
+            if error.code == ENVIRONMENT and (kept := _kept(sender, recorded)):  # there is no router
+                raise UserError(f"{error} {kept}", ENVIRONMENT) from None
+            raise
     print(f"stopped: {', '.join(parts)}; `mobee estop --reset` releases the robot")
     return 0
 
@@ -60,13 +62,22 @@ def _release(endpoint: str) -> None:
 def _recorded(endpoint: str, reason: str) -> bool:
     """Record the stop if the robot was launched on this machine, and return whether it was; print why if the file cannot be written."""
     try:
-        return StopRecord.of_endpoint(endpoint).stop("mobee", reason[:2000])
+        return StopRecord.of_endpoint(endpoint).stop("mobee", reason)
     except OSError as error:
-        print(f"mobee estop: the stop is sent on the bus only: {error.filename} cannot be written: {error.strerror}", file=sys.stderr)
+        print(f"mobee estop: the stop is sent, but not recorded: {error.filename} cannot be written: {error.strerror}", file=sys.stderr)
         return False
 
 
-def _stop(session: Any, reason: str) -> list[str]:
+def _kept(sender: StopSender, recorded: bool) -> str:
+    """Send the stop once more past the router, and return what is known about it, as a text; empty if nothing is."""
+    sender.send()
+    time.sleep(_REPEAT)
+    if sender.is_confirmed():
+        return "robot_sim confirms the stop."
+    return "The stop is recorded: robot_sim obeys the record if it still runs, and comes up stopped if it does not." if recorded else ""
+
+
+def _stop(session: Any, sender: StopSender, reason: str) -> list[str]:
     """Repeat the stop until every part reports it; raises UserError if one does not, or if none is there."""
     stopped: dict[str, bool] = {}  # by part; never False again: a repetition after a release would undo it
 
@@ -78,7 +89,8 @@ def _stop(session: Any, reason: str) -> list[str]:
     publisher = Bus(session, "mobee", logging.getLogger("mobee")).publisher(EStop)
     give_up = time.monotonic() + _PATIENCE
     while time.monotonic() < give_up:
-        publisher.put(set=True, source="mobee", reason=reason[:2000])
+        publisher.put(set=True, source="mobee", reason=reason)
+        sender.send()
         time.sleep(_REPEAT)
         seen = dict(stopped)
         if seen and all(seen.values()):

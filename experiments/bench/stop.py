@@ -4,9 +4,10 @@
 Claim: under each flood of `experiments.kit.live.floods`, and with a thousand idle connections, the stop is obeyed within 50 ms in 99 of 100
 cases, and no process ends.  The robot moves by the motor model at 100 Hz, with its three agents; each stop is sent by a new client.  On the
 machine of robot_sim, `mobee estop` and the web page write the stop into a file, the record of stops: this time begins before it is written.
-From other machines a stop can come only by the bus: this time begins when the client is connected.  Both times end at the time stamp, by
-robot_sim's clock, of the first state message of the head in which the gate (the last check before the motors) is in the state `estop`; this
-is at most a tick after robot_sim has obeyed the stop.  Run time: about a minute for each flood.
+From other machines they send it past the router, as UDP datagrams: this time begins before the socket is opened.  A program that only
+publishes its stop has the bus alone: this time begins when the client is connected; it is shown, but not judged.  The times end at the
+time stamp, by robot_sim's clock, of the first state message of the head in which the gate (the last check before the motors) is in the
+state `estop`; this is at most a tick after robot_sim has obeyed the stop.  Run time: about a minute for each flood.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import os
 import tempfile
 import time
 from collections.abc import Sequence
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -34,6 +35,7 @@ from experiments.kit.live.launch import LaunchFailed
 from experiments.kit.live.system import System, running, stat_of, wait_for
 from services.common import rpc
 from services.common.bus import Bus
+from services.common.emergency_stop import StopSender
 from services.common.observe import Received, listen
 from services.common.session import open_client
 
@@ -51,7 +53,7 @@ class Settings:
     """Settings of the benchmark.
 
     `floods`: names of the floods of messages under which the robot is stopped; "nothing" for none.  `stops`: number of emergency stops
-    under each flood that are written into a file (the record of stops); the same number is sent as messages on the bus.
+    under each flood that are written into a file (the record of stops); the same number is sent as datagrams, and as messages on the bus.
     """
 
     floods: Sequence[str] = (NOTHING, *FLOODS)
@@ -78,9 +80,10 @@ def measure(settings: Settings) -> dict[str, Any]:
     """Stop the robot under each flood of messages and return the result; raises LaunchFailed if the system or a flood ends early.
 
     Main keys: "floods", list with a dict for each flood: medians and 99th percentiles (endings "_p50" and "_p99") of the times [ms] from a
-    stop in the record of stops, a file ("stop_ms"), or on the bus ("bus_stop_ms") until the robot reports it, and of the time to connect a
-    client ("connect_ms"); "late" and "late_by_bus", lists of the names of the floods with a 99th percentile above 50 ms by the record or by
-    the bus; "passed", whether no process ended and no flood is late by the record.  If the machine was busy, lateness does not count.
+    stop in the record of stops, a file ("stop_ms"), by datagrams ("datagram_stop_ms"), or on the bus ("bus_stop_ms") until the robot
+    reports it, and of the time to connect a client ("connect_ms"); "late" and "late_by_bus", lists of the names of the floods with a 99th
+    percentile above 50 ms by the record or by datagrams, and by the bus alone; "resting", floods after which the robot did not move again
+    after every release; "passed", whether no process ended and, unless the machine was busy, both "late" and "resting" are empty.
     """
     rows = []
     with Progress() as progress, tempfile.TemporaryDirectory() as scratch, running(Path(scratch), "kinematic") as system:
@@ -88,7 +91,8 @@ def measure(settings: Settings) -> dict[str, Any]:
             progress.show(done / len(settings.floods), name)
             rows.append(_under(system, name, settings.stops))
     load = float(np.median([row["load"] for row in rows]))
-    late = [row["flood"] for row in rows if row["stop_ms_p99"] > AT_MOST]
+    late = [row["flood"] for row in rows if max(row["stop_ms_p99"], row["datagram_stop_ms_p99"]) > AT_MOST]
+    resting = [row["flood"] for row in rows if row["armed_again"] < 3 * settings.stops]
     late_by_bus = [row["flood"] for row in rows if row["bus_stop_ms_p99"] > AT_MOST]
     return {
         "stops": settings.stops,
@@ -98,7 +102,8 @@ def measure(settings: Settings) -> dict[str, Any]:
         "times_judged": load <= QUIET,
         "late": late,
         "late_by_bus": late_by_bus,
-        "passed": not any(row["ended"] for row in rows) and not (late and load <= QUIET),
+        "resting": resting,
+        "passed": not any(row["ended"] for row in rows) and not (load <= QUIET and (late or resting)),
     }
 
 
@@ -109,14 +114,16 @@ def _under(system: System, name: str, stops: int) -> dict[str, Any]:
         wait_for(lambda: gate.now == "armed", 30.0, "the robot is armed")
         with nullcontext() if name == NOTHING else flood(system.endpoint, name):
             time.sleep(_SETTLE)
-            recorded, armed_before = zip(*(_stop_by_record(system, observer, gate) for _ in range(stops)), strict=True)
-            connected, stopped, armed = zip(*(_stop_by_bus(system, observer, gate) for _ in range(stops)), strict=True)
+            recorded, armed_first = zip(*(_stop_by_record(system, observer, gate) for _ in range(stops)), strict=True)
+            sent, armed_second = zip(*(_stop_by_datagrams(system, observer, gate) for _ in range(stops)), strict=True)
+            connected, stopped, armed_third = zip(*(_stop_by_bus(system, observer, gate) for _ in range(stops)), strict=True)
         after = _processes(observer)
     result: dict[str, Any] = {"flood": name}
-    for what, times in (("stop_ms", recorded), ("bus_stop_ms", stopped), ("connect_ms", connected)):
+    for what, times in (("stop_ms", recorded), ("datagram_stop_ms", sent), ("bus_stop_ms", stopped), ("connect_ms", connected)):
         result |= {f"{what}_p50": float(np.percentile(times, 50)), f"{what}_p99": float(np.percentile(times, 99))}
     ended = [who for who in ALL_VITAL if after[who] != before[who]]
-    return result | {"armed_again": sum(armed_before) + sum(armed), "ended": ended, "load": os.getloadavg()[0]}
+    armed = sum(map(sum, (armed_first, armed_second, armed_third)))
+    return result | {"armed_again": armed, "ended": ended, "load": os.getloadavg()[0]}
 
 
 def _stop_by_record(system: System, observer: Any, gate: _Gate) -> tuple[float, bool]:
@@ -125,6 +132,19 @@ def _stop_by_record(system: System, observer: Any, gate: _Gate) -> tuple[float, 
     system.stop_record.stop("bench", "a test of the stop")
     while gate.now != "estop" and time.monotonic() < begun + _GIVE_UP:
         time.sleep(0.001)
+    took = 1e3 * (gate.since - begun) if gate.now == "estop" else 1e3 * _GIVE_UP
+    return took, _armed_again(observer, gate)
+
+
+def _stop_by_datagrams(system: System, observer: Any, gate: _Gate) -> tuple[float, bool]:
+    """Return the time [ms] from a stop that is sent past the router to `estop`, and whether the robot was armed again."""
+    begun = time.monotonic()
+    with StopSender(system.endpoint, "bench", "a test of the stop") as sender:
+        while gate.now != "estop" and time.monotonic() < begun + _GIVE_UP:
+            sender.send()
+            repeat = time.monotonic() + _REPEAT
+            while gate.now != "estop" and time.monotonic() < repeat:
+                time.sleep(0.001)
     took = 1e3 * (gate.since - begun) if gate.now == "estop" else 1e3 * _GIVE_UP
     return took, _armed_again(observer, gate)
 
@@ -145,13 +165,13 @@ def _stop_by_bus(system: System, observer: Any, gate: _Gate) -> tuple[float, flo
 
 
 def _armed_again(observer: Any, gate: _Gate) -> bool:
-    """Release the robot, and return whether it is armed again."""
-    _release(observer)
-    try:
-        wait_for(lambda: gate.now == "armed", _ARMED, "the robot is armed again")
-    except LaunchFailed:
-        return False
-    return True
+    """Release the robot, and return whether it is armed again; a repetition of the stop that was on its way needs a second release."""
+    for _ in range(2):
+        _release(observer)
+        with suppress(LaunchFailed):
+            wait_for(lambda: gate.now == "armed", _ARMED, "the robot is armed again")
+            return True
+    return False
 
 
 def _release(session: Any) -> None:
@@ -174,19 +194,20 @@ def _processes(session: Any) -> dict[str, int]:
 def report(result: dict[str, Any]) -> str:
     """Return the result of `measure` as text: a table with one line for each flood (many messages, calls or connections)."""
     lines = [
-        f"From a stop to estop in ms, {result['stops']} stops by record and bus under each flood",
-        f"at most {result['at_most_ms']:g} (p99); load of the machine {result['load']:.1f}",
+        f"From a stop to estop in ms, {result['stops']} stops of each kind under each flood",
+        f"at most {result['at_most_ms']:g} (p99) by the record (own machine) and by UDP (other machines);",
+        f"load of the machine {result['load']:.1f}",
+        f"{'':<26}{'record':>12}{'UDP':>12}{'bus alone':>12}{'client':>7}",
+        f"{'flood':<26}" + 3 * f"{'p50':>6}{'p99':>6}" + f"{'p99':>7}{'armed':>7}",
     ]
-    lines.append(f"{'flood':<26}{'p50':>7}{'p99':>7}{'bus p50':>9}{'p99':>7}{'client p50':>12}{'p99':>6}{'armed':>6}")
     for row in result["floods"]:
-        times = "".join(
-            f"{row[f'{what}_p50']:>{widths[0]}.1f}{row[f'{what}_p99']:>{widths[1]}.1f}"
-            for what, widths in (("stop_ms", (7, 7)), ("bus_stop_ms", (9, 7)), ("connect_ms", (12, 6)))
-        )
+        stops = "".join(f"{row[f'{what}_p50']:>6.1f}{row[f'{what}_p99']:>6.1f}" for what in ("stop_ms", "datagram_stop_ms", "bus_stop_ms"))
         ended = f"  ENDED: {', '.join(row['ended'])}" if row["ended"] else ""
-        lines.append(f"{row['flood']:<26}{times}{row['armed_again']:>6}{ended}")
+        lines.append(f"{row['flood']:<26}{stops}{row['connect_ms_p99']:>7.1f}{row['armed_again']:>7}{ended}")
     if result["late_by_bus"]:
-        lines.append(f"late by the bus alone, as from another machine: {', '.join(result['late_by_bus'])}")
+        lines.append(f"late by the bus alone: {', '.join(result['late_by_bus'])}")
+    if result["resting"]:
+        lines.append(f"NOT ARMED AGAIN after each release: {', '.join(result['resting'])}")
     if not result["times_judged"]:
         lines.append(f"times are not judged: the load was above {QUIET:g}")
     elif result["late"]:

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The emergency stop outside of robot_sim: its record on disk (`StopRecord`), and its reception from the bus (`StopLine`).
+"""The emergency stop outside of robot_sim: its record on disk, and its reception from the bus and from datagrams.
 
-A client on robot_sim's machine can write the record itself (`StopRecord.stop`). robot_sim watches the record, so that such a stop needs no
-router.
+`StopRecord` is the record. A client on robot_sim's machine can write it itself (`StopRecord.stop`); robot_sim watches the record, so that
+such a stop needs no router. A client on another machine sends the stop as UDP datagrams too (`StopSender`), which robot_sim receives
+without the router (`StopDatagrams`). `StopLine` receives stops from the bus.
 """
 
 from __future__ import annotations
@@ -10,14 +11,18 @@ from __future__ import annotations
 import json
 import os
 import re
+import socket
 import time
+from contextlib import suppress
 from pathlib import Path
+from types import TracebackType
+from typing import Any
 
 import zenoh
 from msgspec import Struct
 from zenoh.handlers import RingChannel
 
-from bus_schema import Refused, decode
+from bus_schema import VERSION, Refused, decode, encode, encoding_of
 from bus_schema.messages import EStop
 
 BY_LAUNCHER = "launcher"  # source of a stop because a vital service was given up; it ends with that launch
@@ -187,12 +192,124 @@ class StopLine:
             if sample is None:
                 break
             payload = sample.payload.to_bytes() if len(sample.payload) <= _LONGEST else b""
-            if _SETS not in payload:
-                continue
-            try:
-                message = decode(EStop, payload, str(sample.encoding))
-            except Refused:
-                continue
-            if message.set:
+            if (message := _stop_of(payload, str(sample.encoding))) is not None:
                 stops.append(message)
         return stops
+
+
+def _stop_of(payload: bytes, encoding: str) -> EStop | None:
+    """Return the stop in the bytes of a message; None if it sets no stop or cannot be decoded."""
+    if _SETS not in payload:
+        return None
+    try:
+        message = decode(EStop, payload, encoding)
+    except Refused:
+        return None
+    return message if message.set else None
+
+
+_CONFIRMED = b"mobee stopped"  # the answer; it is no stop, so that two receivers never answer each other
+
+
+def datagram_address(endpoint: str) -> str:
+    """Return the UDP address HOST:PORT for stops of the robot whose router listens at an endpoint; it has the number of the TCP port.
+
+    Empty if there is none: the endpoint is secured, because datagrams have no keys, or only processes of its machine can use it.
+    """
+    return re.split("[?#]", endpoint.removeprefix("tcp/"))[0] if endpoint.startswith("tcp/") else ""
+
+
+def _open_socket(address: str) -> tuple[socket.socket, Any]:
+    """Return a UDP socket of the family of the address HOST:PORT, and this address for the socket; raises OSError."""
+    host, _, port = address.rpartition(":")
+    family, kind, protocol, _, place = socket.getaddrinfo(host.strip("[]"), port, type=socket.SOCK_DGRAM)[0]
+    opened = socket.socket(family, kind, protocol)
+    opened.setblocking(False)
+    return opened, place
+
+
+class StopDatagrams:
+    """Receives emergency stops as UDP datagrams: a client on another machine stops the robot without the router.
+
+    A datagram is an `EStop` message, encoded as on the bus. Datagrams that set no stop, or cannot be decoded, are dropped: a datagram never
+    releases the robot.
+    """
+
+    def __init__(self, address: str) -> None:
+        """Receive at the address HOST:PORT; raises OSError if it cannot be used."""
+        self._socket, place = _open_socket(address)
+        self._senders: list[Any] = []
+        try:
+            self._socket.bind(place)
+        except OSError:
+            self._socket.close()
+            raise
+
+    def take(self) -> list[EStop]:
+        """Return the stops that have arrived since the last call."""
+        stops = []
+        for _ in range(_WAITING):
+            try:
+                payload, sender = self._socket.recvfrom(_LONGEST)
+            except BlockingIOError:
+                break
+            except OSError:  # of an answer that did not arrive
+                continue
+            if (message := _stop_of(payload, encoding_of(EStop))) is not None:
+                stops.append(message)
+                self._senders.append(sender)
+        return stops
+
+    def confirm(self) -> None:
+        """Answer the senders of all stops that were taken since the last call: robot_sim obeys them."""
+        for sender in self._senders:
+            with suppress(OSError):  # the sender repeats the stop until it has an answer
+                self._socket.sendto(_CONFIRMED, sender)
+        self._senders.clear()
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._socket.close()
+
+
+class StopSender:
+    """Sends an emergency stop to robot_sim as UDP datagrams.
+
+    It needs no router, and nothing happens if no robot_sim receives datagrams.
+
+    Args:
+        endpoint: address of the router.
+        source: name of the process that stops the robot.
+        reason: text for the user.
+    """
+
+    def __init__(self, endpoint: str, source: str, reason: str) -> None:
+        self._payload = encode(
+            EStop(v=VERSION, run="-", src=source, seq=0, k=0, t=0, tw=time.monotonic_ns(), set=True, source=source, reason=reason)
+        )
+        self._socket: socket.socket | None = None
+        self._confirmed = False
+        with suppress(OSError):  # the record and the bus remain
+            if address := datagram_address(endpoint):
+                self._socket, place = _open_socket(address)
+                self._socket.connect(place)
+
+    def send(self) -> None:
+        """Send the stop once; datagrams can be lost, so callers repeat it until `is_confirmed`, or until the parts report the stop."""
+        if self._socket is not None:
+            with suppress(OSError):
+                self._socket.send(self._payload)
+
+    def is_confirmed(self) -> bool:
+        """Return whether robot_sim has answered that it obeys the stop."""
+        if self._socket is not None:
+            with suppress(OSError):  # nothing has arrived, or no process receives at the address
+                self._confirmed = self._confirmed or self._socket.recv(_LONGEST) == _CONFIRMED
+        return self._confirmed
+
+    def __enter__(self) -> StopSender:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        if self._socket is not None:
+            self._socket.close()

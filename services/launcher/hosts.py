@@ -29,7 +29,8 @@ from services.common.worlds import is_path
 from services.launcher.scenario import FILES, Part, Scenario
 
 LAUNCHER = "launcher"
-_OF_A_HOST = ("endpoint", "run_dir", "stop_record", "bind", "serve", "record")  # settings that may differ between hosts, as all ports may
+# Settings that may differ between hosts, as all ports may.
+_OF_A_HOST = ("endpoint", "run_dir", "stop_record", "stop_address", "bind", "serve", "record")
 _PATIENCE = 5.0  # s within which the first launcher must be ready
 _TRIES = 4  # of the first call, for a router that is at work
 

@@ -153,7 +153,7 @@ def _launch(options: Options, open_meanwhile: contextlib.ExitStack) -> int:
         return _refuse("interrupted before any service was started", INTERRUPTED)
     open_meanwhile.enter_context(bus.session)  # closed although there is no service, if one of the following files cannot be written
     try:
-        directory = make_run_directory(options.runs, here, bus.endpoint)
+        directory = make_run_directory(options.runs, here, bus.endpoint, bus.first is None)
         record = _stop_record(bus, scenario, here)
         service = Service(bus.who, ServiceConfig(endpoint=bus.endpoint), session=bus.session)
         service.log = service.bus.log = set_up_log(bus.who, directory / "logs" / f"{bus.who}.log")

@@ -14,22 +14,24 @@ from typing import Any
 from msgspec import structs, to_builtins
 
 from services.common.config import ServiceConfig
-from services.common.emergency_stop import StopRecord
+from services.common.emergency_stop import StopRecord, datagram_address
 from services.common.worlds import is_path
 from services.launcher.scenario import FILES, Scenario
 
 _PACKAGES = ("mobee", "eclipse-zenoh", "msgspec", "numpy", "pybullet", "mujoco-core", "icub-models", "rerun-sdk")
 
 
-def make_run_directory(runs: Path, scenario: Scenario, endpoint: str) -> Path:
+def make_run_directory(runs: Path, scenario: Scenario, endpoint: str, routes: bool = True) -> Path:
     """Create the folder `runs/<time>-<name>/` of a run, and return its path.
 
     It contains scenario.toml, versions.toml, the settings of each service (<name of the service>.toml), and the folder logs/. `endpoint`:
-    address of the router, written into the settings. Raises OSError if it cannot be written.
+    address of the router, written into the settings. `routes`: whether the router is on this host. Raises OSError if the folder cannot be
+    written.
     """
     directory = _new_folder(runs, f"{time.strftime('%Y%m%d-%H%M%S')}-{scenario.name}")
     (directory / "logs").mkdir()
-    configs = {part.who: _complete(part.config, part.given, endpoint, directory) for part in scenario.parts}
+    address = datagram_address(endpoint) if routes else ""
+    configs = {part.who: _complete(part.config, part.given, endpoint, directory, address) for part in scenario.parts}
     for who, config in configs.items():
         (directory / f"{who}.toml").write_text(to_toml(to_builtins(config)))
     (directory / "scenario.toml").write_text(to_toml(scenario.as_tables(configs)))
@@ -50,8 +52,8 @@ def _new_folder(runs: Path, name: str) -> Path:
     raise FileExistsError(f"too many runs named {name}")
 
 
-def _complete(config: ServiceConfig, given: frozenset[str], endpoint: str, directory: Path) -> ServiceConfig:
-    """Return a service's settings with the endpoint, absolute paths of the files that it reads, and the run's directory."""
+def _complete(config: ServiceConfig, given: frozenset[str], endpoint: str, directory: Path, stop_address: str) -> ServiceConfig:
+    """Return a service's settings with the endpoint, absolute paths of the files that it reads, the run's directory, and how to stop it."""
     named = {field: getattr(config, field, "") for field in FILES}
     files = {field: str(Path(name).resolve()) for field, name in named.items() if is_path(name)}
     config = structs.replace(config, endpoint=endpoint, **files)
@@ -59,6 +61,8 @@ def _complete(config: ServiceConfig, given: frozenset[str], endpoint: str, direc
         config = structs.replace(config, run_dir=str(directory))
     if "stop_record" in config.__struct_fields__ and "stop_record" not in given:
         config = structs.replace(config, stop_record=str(StopRecord.of_endpoint(endpoint).path))
+    if "stop_address" in config.__struct_fields__ and "stop_address" not in given:
+        config = structs.replace(config, stop_address=stop_address)
     return config
 
 

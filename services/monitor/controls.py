@@ -38,7 +38,7 @@ from mobee.arrays import Array
 from mobee.errors import MobeeError
 from mobee.reach import TARGET
 from mobee.robot.robot import Robot
-from services.common.emergency_stop import StopRecord
+from services.common.emergency_stop import StopRecord, StopSender
 from services.common.hands import hand_for, hand_of, part_of
 from services.common.rpc import CallFailed
 from services.common.service import Service
@@ -179,18 +179,20 @@ class PageControls:
 
     def _stop(self) -> str:
         begin = repeat = time.monotonic()
-        source, reason = "page", "pressed on the page"
-        with suppress(OSError):  # the bus remains
-            StopRecord.of_endpoint(self._service.config.endpoint).stop(source, reason)
-        while (now := time.monotonic()) < begin + STOP_PATIENCE:
-            if now >= repeat:
-                self._estop.put(set=True, source=source, reason=reason)
-                repeat = now + STOP_PERIOD
-            time.sleep(STOP_CHECK)
-            if self._known.stopped > begin:  # never again after that: a release may follow at once
-                return "Stopped: all motors."
-            if self._released > begin:
-                raise Refused("a page released the robot before all parts confirmed the stop: press S to stop it again")
+        source, reason, endpoint = "page", "pressed on the page", self._service.config.endpoint
+        with suppress(OSError):  # datagrams and the bus remain
+            StopRecord.of_endpoint(endpoint).stop(source, reason)
+        with StopSender(endpoint, source, reason) as sender:
+            while (now := time.monotonic()) < begin + STOP_PATIENCE:
+                if now >= repeat:
+                    sender.send()
+                    self._estop.put(set=True, source=source, reason=reason)
+                    repeat = now + STOP_PERIOD
+                time.sleep(STOP_CHECK)
+                if self._known.stopped > begin:  # never again after that: a release may follow at once
+                    return "Stopped: all motors."
+                if self._released > begin:
+                    raise Refused("a page released the robot before all parts confirmed the stop: press S to stop it again")
         raise Refused(f"the stop was sent for {STOP_PATIENCE:g} s, and not every part confirms it: use the robot's own emergency button")
 
     def _release_stop(self, given: dict[str, Any]) -> str:

@@ -64,6 +64,8 @@ class Config(WorldConfig, frozen=True, kw_only=True):
     stop_record: str = ""
     """File that records the emergency stop, and into which programs of this machine write a stop. If it is missing at the start, the robot
     is stopped. Empty: no file."""
+    stop_address: Annotated[str, Meta(pattern="^(.+:[0-9]+)?$")] = ""
+    """UDP address HOST:PORT at which programs of other machines stop the robot without the router. Empty: none."""
     record: str = ""
     """Folder into which the true joint positions and the contacts of every tick are written, for experiments (services.robot_sim.watch);
     empty: none."""

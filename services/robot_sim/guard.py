@@ -11,7 +11,7 @@ from bus_schema.messages import Answer, Command, Commands, EStop
 from bus_schema.rpc import Done, Driven, Empty, Take, Taken, WithEpoch
 from mobee.arrays import Array
 from mobee.robot.robot import Robot
-from services.common.emergency_stop import Stop, StopLine, StopRecord, replaces
+from services.common.emergency_stop import Stop, StopDatagrams, StopLine, StopRecord, replaces
 from services.common.inbox import Timer
 from services.common.service import CallRefused, Service
 from services.robot_sim.gate import LOCKED_TTL, Gate, Limits, Order, orders_of, refused_as_call
@@ -25,14 +25,23 @@ CHECK_PERIOD = 0.01  # s between two checks for an emergency stop; there is one 
 class Guard:
     """The safety gates, one for each part (the last check of commands before its motors), and the emergency stop of all parts."""
 
-    def __init__(self, service: Service, robot: Robot, backend: Backend, dt: float, record: StopRecord | None, speed: float = 1.0) -> None:
+    def __init__(
+        self,
+        service: Service,
+        robot: Robot,
+        backend: Backend,
+        dt: float,
+        record: StopRecord | None,
+        datagrams: StopDatagrams | None,
+        speed: float = 1.0,
+    ) -> None:
         """Make the gates; an emergency stop in the record is in force from the beginning.
 
-        `dt`: the tick, s. `record`: the file that keeps emergency stops; None: a stop ends with this process. `speed`: simulated seconds
-        per second of real time.
+        `dt`: the tick, s. `record`: the file that keeps emergency stops; None: a stop ends with this process. `datagrams`: receives stops
+        without the router; None: only bus and record do. `speed`: simulated seconds per second of real time.
         """
         self._service, self._robot, self._backend, self._dt, self._record = service, robot, backend, dt, record
-        self._speed = speed
+        self._datagrams, self._speed = datagrams, speed
         self._where = {name: part.slice for name, part in robot.parts.items()}
         self._stop: Stop | None = None if record is None else record.read()
         self._counted = dict.fromkeys(INDISPENSABLE, "")  # instance that was there first: a second token of that name changes nothing
@@ -217,6 +226,10 @@ class Guard:
                 self._obey(Stop(message.source, message.reason, time.time()))
         if self._record is not None and (recorded := self._record.new_stop()) is not None:
             self._obey(recorded)
+        if self._datagrams is not None:
+            for message in self._datagrams.take():
+                self._obey(Stop(message.source, message.reason, time.time()))
+            self._datagrams.confirm()
 
     def _obey(self, stop: Stop) -> None:
         if not replaces(stop, self._stop):

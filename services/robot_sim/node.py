@@ -21,7 +21,7 @@ from bus_schema.messages import Clock
 from bus_schema.rpc import Done, Empty, Pace, PartMeta, Place
 from mobee.errors import MobeeError
 from mobee.robot.robot import Robot
-from services.common.emergency_stop import StopRecord
+from services.common.emergency_stop import StopDatagrams, StopRecord
 from services.common.listener import MAX_CLOCK_RATE
 from services.common.rate import Rate
 from services.common.service import CallRefused, Service
@@ -61,7 +61,7 @@ class Node:
         self._pause: Pause | None = None
         self._pace = 0.0  # lockstep: s of real time that a simulated second takes at least
         record = StopRecord(Path(config.stop_record)) if config.stop_record else None
-        self._guard = Guard(service, robot, backend, self._dt, record, config.speed)
+        self._guard = Guard(service, robot, backend, self._dt, record, self._open_datagrams(), config.speed)
         self._phases = Phases(tuple(robot.parts), config.jitter, config.seed)
         self._sensors = Sensors(self._bus, robot, self._dt, errors_of(robot, config.encoder_errors))
         self._clock = self._bus.publisher(Clock)
@@ -82,6 +82,16 @@ class Node:
         service.on_request(keys.sim("pace"), Pace, self._set_pace)
         for part in robot.parts:
             service.on_request(keys.meta(part), Empty, self._meta)
+
+    def _open_datagrams(self) -> StopDatagrams | None:
+        """Return the receiver of stops without the router; None if the settings name no address for it, or if it cannot be used."""
+        address = self._config.stop_address
+        try:
+            return StopDatagrams(address) if address else None
+        except OSError as error:
+            text = f"no stop is received at the UDP address {address}, only from bus and record: {error}"
+            self._bus.event("warning", "stop_address", text)
+            return None
 
     def run(self) -> None:
         """Run ticks until the process is asked to end."""

@@ -16,7 +16,7 @@ from bus_schema.rpc import Done
 from mobee_cli import estop
 from mobee_cli.__main__ import main
 from services.common.bus import Bus
-from services.common.emergency_stop import StopRecord
+from services.common.emergency_stop import StopDatagrams, StopRecord
 from services.common.observe import listen
 from services.common.session import open_router
 
@@ -110,6 +110,29 @@ def test_a_stop_is_recorded_although_no_router_answers(
     assert "The stop is recorded: robot_sim obeys the record if it still runs" in capsys.readouterr().err
     stop = record.read()
     assert stop is not None and (stop.source, stop.reason) == ("mobee", "smoke")
+
+
+def test_robot_sim_confirms_a_stop_although_no_router_answers(
+    endpoint: str, free_port: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(estop, "_CONNECT_PATIENCE", 0.1)
+    over, datagrams, reasons = threading.Event(), StopDatagrams(f"127.0.0.1:{free_port}"), set[str]()
+
+    def obey() -> None:
+        while not over.wait(0.01):
+            reasons.update(stop.reason for stop in datagrams.take())
+            datagrams.confirm()
+
+    thread = threading.Thread(target=obey)
+    thread.start()
+    try:
+        assert main(["estop", "--endpoint", endpoint, "--reason", "smoke"]) == 3
+    finally:
+        over.set()
+        thread.join()
+        datagrams.close()
+    assert reasons == {"smoke"}
+    assert "robot_sim confirms the stop." in capsys.readouterr().err
 
 
 def test_reset_releases(robot: Robot, endpoint: str) -> None:

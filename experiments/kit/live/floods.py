@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Floods of messages, calls, liveliness tokens and connections, each from its own process: `python -m experiments.kit.live.floods`.
+"""Floods of messages, calls, tokens, connections and datagrams, each from its own process: `python -m experiments.kit.live.floods`.
 
-A flood is one kind of message, call or token at a high rate, or 1000 idle connections, to disturb a live system.  It needs no secret: every
-program on the machine that follows the documentation of the bus can send it.
+A flood is one kind of message, call, liveliness token or datagram at a high rate, or 1000 idle connections, to disturb a live system.  It
+needs no secret: every program on the machine that follows the documentation of the bus can send it.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from bus_schema import VERSION, encode, encoding_of, keys
 from bus_schema.messages import Clock, Commands, EStop, Event, Forces, Image, Message, Motion, State, Tick, Transition, WorldObject
 from bus_schema.rpc import Empty
 from experiments.kit.live.launch import LaunchFailed
+from services.common.emergency_stop import datagram_address
 from services.common.session import open_client
 
 MESSAGES, BIG_MESSAGES, CALLS, TOKENS = 10_000, 100, 1_400, 500  # a second
@@ -95,6 +96,19 @@ def _is_closed(connection: socket.socket) -> bool:
         return True
 
 
+def _send_datagrams(endpoint: str) -> None:
+    """Send garbage to the address at which robot_sim receives stops without the router."""
+    host, _, port = datagram_address(endpoint).rpartition(":")
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        sender.connect((host, int(port)))
+
+        def send() -> None:
+            with suppress(OSError):  # no process receives there
+                sender.send(_GARBAGE)
+
+        _paced(MESSAGES, send)
+
+
 FLOODS: dict[str, Callable[[str], None]] = {
     "estop, set = false": _put(EStop, "", _no_stop(), MESSAGES),
     "estop, garbage": _put(EStop, "", _GARBAGE, MESSAGES),
@@ -113,6 +127,7 @@ FLOODS: dict[str, Callable[[str], None]] = {
     "image, 1 MB": _put(Image, "left", _BIG, BIG_MESSAGES),
     "tokens": _come_and_go,
     "idle connections": _connect,
+    "datagrams, garbage": _send_datagrams,
 }
 
 

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The record of emergency stops on disk."""
+"""The emergency stop on disk, on the bus and in datagrams."""
 
 from __future__ import annotations
 
+import socket
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -10,7 +12,7 @@ import zenoh
 
 from bus_schema import VERSION, encode, encoding_of
 from bus_schema.messages import EStop
-from services.common.emergency_stop import Stop, StopLine, StopRecord
+from services.common.emergency_stop import Stop, StopDatagrams, StopLine, StopRecord, StopSender, datagram_address
 from services.common.session import open_client
 from tests.services.harness import Rig, wait_for
 
@@ -79,10 +81,11 @@ def test_each_endpoint_has_a_record_of_its_own(tmp_path: Path, monkeypatch: pyte
     assert len(paths) == 3 and all(path.is_relative_to(tmp_path) for path in paths)
 
 
-def test_a_stop_is_heard_among_messages_that_set_none_and_only_once(bus: Rig) -> None:
-    def message(sets: bool, reason: str) -> bytes:
-        return encode(EStop(v=VERSION, run="r", src="test", seq=0, k=0, t=0, tw=0, set=sets, source="test", reason=reason))
+def message(sets: bool, reason: str) -> bytes:
+    return encode(EStop(v=VERSION, run="r", src="test", seq=0, k=0, t=0, tw=0, set=sets, source="test", reason=reason))
 
+
+def test_a_stop_is_heard_among_messages_that_set_none_and_only_once(bus: Rig) -> None:
     # Without blocking, Zenoh drops messages of such a burst: a real stop is repeated, this one is sent once.
     key, how = EStop.stream.key(), {"encoding": encoding_of(EStop), "congestion_control": zenoh.CongestionControl.BLOCK}
     with open_client(bus.endpoint) as session:
@@ -98,3 +101,63 @@ def test_a_stop_is_heard_among_messages_that_set_none_and_only_once(bus: Rig) ->
         wait_for(lambda: heard.extend(line.take()) or heard, "the second stop")
         assert [stop.reason for stop in heard] == ["second"]
         assert line.take() == []
+
+
+@pytest.mark.parametrize(
+    ("endpoint", "address"),
+    [
+        ("tcp/192.168.1.5:7447", "192.168.1.5:7447"),
+        ("tcp/[::1]:7447#iface=eth0", "[::1]:7447"),
+        ("tls/192.168.1.5:7447", ""),
+        ("unixsock-stream/bus", ""),
+    ],
+)
+def test_a_robot_without_keys_receives_datagrams_at_the_number_of_its_port(endpoint: str, address: str) -> None:
+    assert datagram_address(endpoint) == address
+
+
+@pytest.fixture
+def datagrams(free_port: int) -> Iterator[StopDatagrams]:
+    receiver = StopDatagrams(f"127.0.0.1:{free_port}")
+    yield receiver
+    receiver.close()
+
+
+def test_a_datagram_stops_the_robot_and_is_confirmed(datagrams: StopDatagrams, free_port: int) -> None:
+    with StopSender(f"tcp/127.0.0.1:{free_port}", "mobee", "a hand in the way") as sender:
+        sender.send()
+        stops = wait_for(datagrams.take, "the stop")
+        assert [(stop.source, stop.reason) for stop in stops] == [("mobee", "a hand in the way")]
+        assert not sender.is_confirmed()
+        datagrams.confirm()
+        wait_for(sender.is_confirmed, "the confirmation")
+    assert datagrams.take() == []
+
+
+def test_datagrams_that_set_no_stop_are_dropped_without_an_answer(datagrams: StopDatagrams, free_port: int) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        sender.connect(("127.0.0.1", free_port))
+        for payload in (b"", b"\xc1" * 100, b"mobee stopped", message(False, "a release"), message(True, "x" * 5000)):
+            sender.send(payload)
+        sender.send(message(True, "last"))
+        stops = wait_for(datagrams.take, "the stop")
+        assert [stop.reason for stop in stops] == ["last"]
+        datagrams.confirm()
+        sender.settimeout(5.0)
+        assert sender.recv(100) == b"mobee stopped"
+        sender.setblocking(False)
+        with pytest.raises(BlockingIOError):
+            sender.recv(100)
+
+
+@pytest.mark.parametrize("endpoint", ["tls/127.0.0.1:{port}", "tcp/127.0.0.1:{port}"])
+def test_a_stop_that_no_process_receives_is_not_confirmed(free_port: int, endpoint: str) -> None:
+    with StopSender(endpoint.format(port=free_port), "mobee", "") as sender:
+        sender.send()
+        sender.send()  # the first one was refused
+        assert not sender.is_confirmed()
+
+
+def test_an_address_in_use_is_an_error(datagrams: StopDatagrams, free_port: int) -> None:
+    with pytest.raises(OSError, match="in use"):
+        StopDatagrams(f"127.0.0.1:{free_port}")

@@ -126,6 +126,21 @@ def test_the_run_s_record_names_files_so_that_they_are_found_from_anywhere(tmp_p
     assert (written["robot"], written["world"]) == (str(tmp_path / "arm.xml"), "table")
 
 
+@pytest.mark.parametrize(
+    ("endpoint", "routes", "address"),
+    [
+        ("tcp/192.168.1.5:7447", True, "192.168.1.5:7447"),
+        ("tcp/192.168.1.5:7447", False, ""),
+        ("tls/192.168.1.5:7447", True, ""),
+    ],
+)
+def test_robot_sim_receives_datagrams_on_the_router_s_host_only(
+    tmp_path: Path, scenario: Path, endpoint: str, routes: bool, address: str
+) -> None:
+    run = make_run_directory(tmp_path / "runs", read_scenario(str(scenario)), endpoint, routes)
+    assert tomllib.loads((run / "robot_sim.toml").read_text())["stop_address"] == address
+
+
 def test_settings_of_the_command_line_win(scenario: Path) -> None:
     parts = {part.who: part.config for part in read_scenario(str(scenario), ["services.model.contact_forces=false", "shared.seed=5"]).parts}
     assert parts["model"].contact_forces is False

@@ -15,7 +15,7 @@ from bus_schema import keys
 from bus_schema.messages import EStop
 from bus_schema.rpc import Done, Empty
 from experiments.kit.live.launch import free_endpoint
-from services.common.emergency_stop import Stop, StopRecord
+from services.common.emergency_stop import Stop, StopDatagrams, StopRecord, StopSender
 from services.common.rpc import CallFailed
 from tests.services.harness import rig, wait_for
 from tests.services.robot_sim.bench import ROBOT, Bench, elbow
@@ -140,6 +140,31 @@ def test_a_stop_in_the_record_is_obeyed_without_a_message(tmp_path: Path) -> Non
         bus.call(keys.ESTOP_RESET, Empty, Done)
         assert record.read() is None
         assert bench.next_state("torso").gate == "hold"
+
+
+def test_a_stop_that_comes_as_a_datagram_is_obeyed_recorded_and_confirmed(tmp_path: Path, free_port: int) -> None:
+    record = StopRecord(tmp_path / "stop.json")
+    record.create()
+    with rig(tmp_path, ROBOT) as bus:
+        bench = Bench(bus, "--backend", "kinematic", "--stop-record", str(record.path), "--stop-address", f"127.0.0.1:{free_port}")
+        with StopSender(f"tcp/127.0.0.1:{free_port}", "mobee", "a hand in the way") as sender:
+            sender.send()
+            wait_for(sender.is_confirmed, "the confirmation")
+        assert {bench.next_state(part).gate for part in ROBOT.parts} == {"estop"}
+        stop = record.read()
+        assert stop is not None and (stop.source, stop.reason) == ("mobee", "a hand in the way")
+        bus.call(keys.ESTOP_RESET, Empty, Done)
+        assert bench.next_state("torso").gate == "hold"
+
+
+def test_an_address_for_stops_that_is_in_use_is_reported_and_the_bus_remains(tmp_path: Path, free_port: int) -> None:
+    other = StopDatagrams(f"127.0.0.1:{free_port}")
+    with rig(tmp_path, ROBOT) as bus:
+        bench = Bench(bus, "--backend", "kinematic", "--stop-address", f"127.0.0.1:{free_port}")
+        bench.hears("stop_address", 0, "from bus and record")
+        bench.rig.bus.publisher(EStop).put(set=True, source="test", reason="because")
+        wait_for(lambda: bench.next_state("torso").gate == "estop", "the stop")
+    other.close()
 
 
 def test_a_stop_that_cannot_be_recorded_holds_and_is_reported(tmp_path: Path) -> None:
