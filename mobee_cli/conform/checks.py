@@ -20,6 +20,7 @@ from bus_schema import keys
 from bus_schema.messages import EStop, Mode, Order, State
 from bus_schema.rpc import Config, Done, Empty, PartMeta, Pulse
 from mobee.arrays import Array
+from mobee.robot.motor_units import fine_units, motor_units, unit_name
 from mobee_cli.conform.player import ANSWER, TTL, Broken, Player
 from services.common.rpc import CallFailed
 from services.common.worlds import robot_hash
@@ -28,6 +29,7 @@ from services.robot_sim.sensors import part_meta
 OBSERVED = 1.5  # s for which the streams are recorded
 MISSING = 0.1  # share of the ticks that may not arrive
 SLOWEST, FASTEST = 0.5, 1.1  # of the rate that dt claims: a busy machine is slow, nothing is fast
+# For a motor that slides, these numbers count as angles: 1 rad is the unit of its motor_units (SPEED, JUMP) or of its fine_units (others).
 OUTSIDE = math.radians(5.0)  # rad beyond its limits at which a position cannot be right
 SPEED = 0.1  # rad/s, at which a motor is moved
 MOTION = 0.4  # s for which it is moved
@@ -121,17 +123,19 @@ def ticks(player: Player, part: str) -> None:
 
 
 def positions(player: Player, part: str) -> None:
-    """Test that all motor positions are within the limits of the robot file, with a tolerance of 5 degrees; raises Broken otherwise.
+    """Test that all motor positions are within the limits of the robot file; raises Broken otherwise.
 
-    `part`: not used.
+    The tolerance is 5 degrees; for a motor that slides, it is some 0.6 % of its range. `part`: not used.
     """
-    low, high = player.robot.limits.T
+    robot = player.robot
+    low, high = robot.limits.T
     q = np.array(player.tick.q)
-    beyond = np.maximum(q - high, low - q)
+    beyond = np.maximum(q - high, low - q) / fine_units(robot)
     worst = int(beyond.argmax())
     if beyond[worst] > OUTSIDE:
-        unit = " Are they degrees? The bus has rad." if abs(q[worst]) > math.pi else ""
-        raise Broken(f"{player.robot.motors[worst]} is at {q[worst]:.3f}, its limits are {low[worst]:.3f} to {high[worst]:.3f} rad.{unit}")
+        unit = unit_name(robot, robot.motor_table[worst])
+        hint = " Are they degrees? The bus has rad." if unit == "rad" and abs(q[worst]) > math.pi else ""
+        raise Broken(f"{robot.motors[worst]} is at {q[worst]:.3f}, its limits are {low[worst]:.3f} to {high[worst]:.3f} {unit}.{hint}")
 
 
 def ownership(player: Player, part: str) -> None:
@@ -169,7 +173,7 @@ def obeys(player: Player, part: str) -> None:
     with player.armed(part):
         start, speed = player.q(part), _speed(player, part)
         player.keep(part, "velocity", lambda: speed, MOTION)
-        _require_moved(player.q(part) - start, speed * MOTION, "velocity")
+        _require_moved(player, part, player.q(part) - start, speed * MOTION, "velocity")
         status = player.status(part)
         if status.cmd_seq < 0 or status.mode != "velocity" or not 0 < status.cmd_age < 1e3:
             raise Broken(
@@ -181,7 +185,7 @@ def obeys(player: Player, part: str) -> None:
         player.drive(part, "arm")
         start, done = player.q(part), player.tick
         player.keep(part, "position", lambda: start - speed * (player.tick.t - done.t) * 1e-9, MOTION)
-        _require_moved(player.q(part) - start, -speed * MOTION, "position")
+        _require_moved(player, part, player.q(part) - start, -speed * MOTION, "position")
 
 
 def refuses(player: Player, part: str) -> None:
@@ -191,7 +195,7 @@ def refuses(player: Player, part: str) -> None:
     """
     n = len(player.robot.part(part))
     still, nan = np.zeros(n), np.full(n, math.nan)
-    limits = player.robot.limits[player.robot.part(part).slice]
+    limits, jump = player.robot.limits[player.robot.part(part).slice], JUMP * _units(player, part)
     fast = np.array([player.robot.motor_table[k].max_velocity for k in range(*player.robot.part(part).slice.indices(10**6))])
     with player.armed(part):
         bad: dict[str, tuple[Mode, Callable[[], Array], dict[str, Callable[[], object]]]] = {
@@ -202,8 +206,8 @@ def refuses(player: Player, part: str) -> None:
             "without an end (ttl 0)": ("velocity", lambda: still, {"ttl": lambda: 0}),
             "of NaN": ("velocity", lambda: nan, {}),
             "of 1.2 times the highest velocity": ("velocity", lambda: 1.2 * fast * (np.arange(n) == 0), {}),
-            "that jumps by 0.1 rad": ("position", lambda: player.q(part) + JUMP * _toward_middle(player, part), {}),
-            "beyond a limit": ("position", lambda: np.where(np.arange(n) == 0, limits[:, 1] + JUMP, player.q(part)), {}),
+            "that jumps by 0.1 rad": ("position", lambda: player.q(part) + jump * _toward_middle(player, part), {}),
+            "beyond a limit": ("position", lambda: np.where(np.arange(n) == 0, limits[:, 1] + jump, player.q(part)), {}),
         }
         for what, (mode, ref, changed) in bad.items():
             fields = {name: value() for name, value in changed.items()}
@@ -271,7 +275,7 @@ CHECKS = (
     Check("streams", "tick, clock and the state of each part are valid messages", streams),
     Check("ticks", "ticks are numbered, dated and published at their rate", ticks),
     Check("parts", "parts, motors and limits are those of the robot file", parts),
-    Check("positions", "positions are within the limits, in rad", positions),
+    Check("positions", "positions are within the limits, in rad or m", positions),
     Check("ownership", "a part is taken, armed and released by its owner alone", ownership, moves=True),
     Check("hold", "a part that is not armed ignores commands", hold, moves=True),
     Check("obeys", "an armed part follows velocities and positions", obeys, moves=True),
@@ -302,7 +306,12 @@ def _toward_middle(player: Player, part: str) -> Array:
 
 
 def _speed(player: Player, part: str) -> Array:
-    return SPEED * _toward_middle(player, part)
+    return SPEED * _units(player, part) * _toward_middle(player, part)
+
+
+def _units(player: Player, part: str) -> Array:
+    """Return for each motor of the part the motion that counts as 1 rad, (n_part,) rad or m."""
+    return motor_units(player.robot)[player.robot.part(part).slice]
 
 
 def _ticks_ago(player: Player, seconds: float) -> int:
@@ -310,17 +319,24 @@ def _ticks_ago(player: Player, seconds: float) -> int:
 
 
 def _require_still(player: Player, part: str, start: Array, what: str) -> None:
-    moved = float(np.abs(player.q(part) - start).max())
-    if moved > STILL:
-        raise Broken(f"{what} (it moved by {math.degrees(moved):.1f} deg)")
+    moved = np.abs(player.q(part) - start)
+    most = int((moved / fine_units(player.robot)[player.robot.part(part).slice]).argmax())
+    if moved[most] > STILL * fine_units(player.robot)[player.robot.part(part).slice][most]:
+        raise Broken(f"{what} ({player.robot.part(part).motors[most]} moved by {_distance(player, part, most, moved[most])})")
 
 
-def _require_moved(moved: Array, wanted: Array, mode: str) -> None:
+def _require_moved(player: Player, part: str, moved: Array, wanted: Array, mode: str) -> None:
     if moved[0] * np.sign(wanted[0]) < LEAST * abs(wanted[0]):
         raise Broken(
-            f"by {mode} commands the first motor was to move by {math.degrees(wanted[0]):.2f} deg, and it moved by "
-            f"{math.degrees(moved[0]):.2f} deg"
+            f"by {mode} commands the first motor was to move by {_distance(player, part, 0, wanted[0])}, and it moved by "
+            f"{_distance(player, part, 0, moved[0])}"
         )
+
+
+def _distance(player: Player, part: str, number: int, moved: float) -> str:
+    """Return a distance that a motor of the part moved, given in rad or m, as text; `number`: of the motor in the part."""
+    motors = player.robot.motor_table[player.robot.part(part).slice]
+    return f"{1e3 * moved:.1f} mm" if unit_name(player.robot, motors[number]) == "m" else f"{math.degrees(moved):.2f} deg"
 
 
 def _send(player: Player, part: str, mode: Mode, ref: Callable[[], Array], fields: dict[str, object]) -> int:

@@ -14,6 +14,7 @@ import numpy as np
 from mobee import Model
 from mobee.arrays import Array
 from mobee.roadmap.roadmap import Roadmap, load_roadmap
+from mobee.robot.motor_units import unit_name
 from mobee.robot.robot import Robot
 from mobee_cli.errors import UserError
 from mobee_cli.robot_options import add_robot, require_none, robot_given, world_given
@@ -69,14 +70,16 @@ def start_of(trm: Roadmap, given: list[float] | None) -> Array:
     if len(given) != len(robot.motors):
         names = ", ".join(trm.names)
         raise UserError(
-            f"--from has {len(given)} numbers; give {len(trm.spacing)} task coordinates ({names}), or {len(robot.motors)} angles in rad",
+            f"--from has {len(given)} numbers; give {len(trm.spacing)} task coordinates ({names}), or {len(robot.motors)} motor positions "
+            "in rad (slides: m)",
             BAD_INPUT,
         )
     q = np.array(given)
     low, high = robot.limits.T
     for motor in np.flatnonzero((q < low - 0.01) | (q > high + 0.01))[:1]:
+        unit = unit_name(robot, robot.motor_table[motor])
         raise UserError(
-            f"--from: {robot.motors[motor]} cannot be at {q[motor]:g} rad: valid is {low[motor]:.3g} to {high[motor]:.3g}", BAD_INPUT
+            f"--from: {robot.motors[motor]} cannot be at {q[motor]:g} {unit}: valid is {low[motor]:.3g} to {high[motor]:.3g}", BAD_INPUT
         )
     within: Array = np.clip(q, low, high)
     return within

@@ -32,13 +32,13 @@ class Guard:
         backend: Backend,
         dt: float,
         record: StopRecord | None,
-        datagrams: StopDatagrams | None,
         speed: float = 1.0,
+        datagrams: StopDatagrams | None = None,
     ) -> None:
         """Make the gates; an emergency stop in the record is in force from the beginning.
 
-        `dt`: the tick, s. `record`: the file that keeps emergency stops; None: a stop ends with this process. `datagrams`: receives stops
-        without the router; None: only bus and record do. `speed`: simulated seconds per second of real time.
+        `dt`: the tick, s. `record`: the file that keeps emergency stops; None: a stop ends with this process. `speed`: simulated seconds
+        per second of real time. `datagrams`: receives stops without the router; None: only bus and record do.
         """
         self._service, self._robot, self._backend, self._dt, self._record = service, robot, backend, dt, record
         self._datagrams, self._speed = datagrams, speed

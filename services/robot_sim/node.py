@@ -61,7 +61,7 @@ class Node:
         self._pause: Pause | None = None
         self._pace = 0.0  # lockstep: s of real time that a simulated second takes at least
         record = StopRecord(Path(config.stop_record)) if config.stop_record else None
-        self._guard = Guard(service, robot, backend, self._dt, record, self._open_datagrams(), config.speed)
+        self._guard = Guard(service, robot, backend, self._dt, record, config.speed, self._open_datagrams())
         self._phases = Phases(tuple(robot.parts), config.jitter, config.seed)
         self._sensors = Sensors(self._bus, robot, self._dt, errors_of(robot, config.encoder_errors))
         self._clock = self._bus.publisher(Clock)

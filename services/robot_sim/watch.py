@@ -16,6 +16,7 @@ from mobee.arrays import Array
 from mobee.errors import InvalidValue
 from mobee.model.kinematics import quaternion_from_matrix
 from mobee.model.world import World
+from mobee.robot.motor_units import fine_units
 from mobee.robot.robot import Robot
 from mobee.simulation.motors import Motors
 from services.common.bus import Bus
@@ -24,7 +25,7 @@ from services.robot_sim.gate import Gate
 from services.robot_sim.guard import Guard
 from services.robot_sim.kinematic import Backend, SolidContact
 
-REST_SPEED = np.deg2rad(1.0)  # rad/s; a part whose motors are slower is at rest
+REST_SPEED = np.deg2rad(1.0)  # rad/s, for slides times `fine_units`; a part whose motors are slower is at rest
 
 
 @dataclass(slots=True)
@@ -258,6 +259,7 @@ class Watch:
         self._bus, self._robot, self._backend, self._guard = bus, robot, backend, guard
         self._truth = bus.publisher(Truth)
         self._truth_period = truth_period
+        self._rest_speed = REST_SPEED * fine_units(robot)
         self._deepest = SolidContact()  # since the last truth message
         self.counters = Counters()
 
@@ -296,7 +298,7 @@ class Watch:
 
     def _watch_stops(self, all_q: Array) -> None:
         now, stops = self._bus.t, self.counters.stops
-        fast = (np.abs(self._backend.motors.motor_velocities) > REST_SPEED).tolist()
+        fast = (np.abs(self._backend.motors.motor_velocities) > self._rest_speed).tolist()
         for part, gate in self._guard.gates.items():
             where = self._robot.parts[part].slice
             q, moves = all_q[where], any(fast[where])
