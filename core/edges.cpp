@@ -10,7 +10,7 @@
 
 namespace mobee {
 
-// The arguments from Python, see mobee/_core/edges.py.
+// The arguments from Python, see mobee/_core/roadmap.py.
 struct Motions {
     Neighbours* const* near;      // (threads,): the neighbour list of each, all in one world
     const double* q;              // (vertices, motors)

@@ -12,7 +12,7 @@
 
 namespace mobee {
 
-// The arguments from Python, see mobee/_core/least_squares.py.
+// The arguments from Python, see mobee/_core/roadmap.py.
 struct Search {
     const Robot* robot;
     const Aim* aims;           // (count,)

@@ -8,7 +8,7 @@
 
 namespace mobee {
 
-struct Neighbours;  // the state of one user from pose to pose, of a robot in a scene; mobee/model/track.py makes it
+struct Neighbours;  // the state of one user from pose to pose, of a robot in a scene; mobee/model/engine.py makes it
 
 // Find the contacts in the pose q (motors,), unsorted; returns their number.
 std::int64_t find(Neighbours& near, const double* q);

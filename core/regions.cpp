@@ -10,7 +10,7 @@
 
 namespace mobee {
 
-// The arguments from Python, see mobee/_core/regions.py.
+// The arguments from Python, see mobee/_core/vision.py.
 struct Coloring {
     const float* likeness;      // (height, width): how much of a colour is in each pixel, 0 for none
     double* points;             // (room, 2), filled: column and row of the outlines' points, one region after the other

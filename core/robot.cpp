@@ -9,7 +9,7 @@
 
 namespace mobee {
 
-// The tables of a robot as Python makes them, see mobee/model/robot_tables.py; all are copied.
+// The tables of a robot as Python makes them, see mobee/model/core_tables.py; all are copied.
 struct RobotTables {
     std::int64_t motors, joints, drives, shapes, own_shapes, clusters, corners, edges;
     const std::int64_t *parent, *slides, *border;         // (joints,)

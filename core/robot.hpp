@@ -20,7 +20,7 @@ struct Joint {
     Vec3 axis, point;     // root frame at zero pose
 };
 
-// A volume in a table that Python makes, see mobee/model/volumes.py.
+// A volume in a table that Python makes, see mobee/model/core_tables.py.
 struct VolumeRow {
     std::int64_t kind;
     Vec3 position;

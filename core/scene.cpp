@@ -9,7 +9,7 @@
 
 namespace mobee {
 
-// A snapshot of the world in Python's layout, see mobee/model/snapshot.py.  Everything except the robot is copied.
+// A snapshot of the world in Python's layout, see mobee/model/engine.py.  Everything except the robot is copied.
 struct WorldTables {
     std::int64_t objects, carried, side;  // side: number of grid cells along the longest side
     const VolumeRow* volume;              // (objects,)

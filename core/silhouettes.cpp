@@ -8,7 +8,7 @@
 
 namespace mobee {
 
-// The arguments from Python, see mobee/_core/silhouettes.py.  The columns of `slopes` are of: the position, the lengths, the angle about the
+// The arguments from Python, see mobee/_core/vision.py.  The columns of `slopes` are of: the position, the lengths, the angle about the
 // vertical if the shape `turns`, `noises` and `biases` of the cameras, three shifts of the outline in each picture, and two in all of them.
 struct Silhouette {
     const double* flat;      // (points, 2): of the outline, in the plane at distance 1 of the camera

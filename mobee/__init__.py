@@ -11,34 +11,30 @@ if TYPE_CHECKING:
     from mobee.derivation import Derived, derive
     from mobee.errors import ActionInterrupted, BatchInterrupted, InvalidValue, MobeeError, RobotFileError, UnknownName
     from mobee.learning.agent import CuriousAgent, run
-    from mobee.learning.grid import Grid
     from mobee.learning.lattice import Lattice
     from mobee.learning.learner import CuriousSettings
-    from mobee.learning.object_space import ObjectSpace
+    from mobee.learning.object_space import Grid, ObjectSpace
     from mobee.learning.planner import Plan, Planner
     from mobee.learning.reaching.learner import ReachSettings
     from mobee.learning.reaching.reach_agent import ReachAgent
-    from mobee.learning.space import Space
+    from mobee.learning.space import Space, Voronoi
     from mobee.learning.transitions import TransitionModel
     from mobee.learning.value_iteration import policy_iteration, value_iteration
-    from mobee.learning.voronoi import Voronoi
     from mobee.model import Contact, Geometry, World, WorldObject, box, capsule, cylinder, sphere
     from mobee.model.model import Model
     from mobee.model.pose import Pose
     from mobee.model.world_file import load_world
     from mobee.plant import Outcome, PerceivingPlant, Plant
     from mobee.reach import ReachOutcome, ReachPlant, ReachTarget
-    from mobee.roadmap.adaptive.adaptive import AdaptiveRoadmap
-    from mobee.roadmap.adaptive.edge_beliefs import roadmap_space
-    from mobee.roadmap.adaptive.explorer import MapExplorer
-    from mobee.roadmap.adaptive.walker import Walker
+    from mobee.roadmap.adaptive.adaptive import AdaptiveRoadmap, roadmap_space
+    from mobee.roadmap.adaptive.walker import MapExplorer, Walker
     from mobee.roadmap.building import tasks
-    from mobee.roadmap.building.build import build_roadmap
-    from mobee.roadmap.building.settings import RoadmapSettings, SearchSettings
+    from mobee.roadmap.building.build import RoadmapSettings, build_roadmap
+    from mobee.roadmap.building.search_scheduler import SearchSettings
     from mobee.roadmap.evolution.nes import NES
     from mobee.roadmap.evolution.search import Restart, minimize
     from mobee.roadmap.ik import costs
-    from mobee.roadmap.ik.ngik import IK, solve_ik
+    from mobee.roadmap.ik.solve import IK, solve_ik
     from mobee.roadmap.roadmap import Roadmap, load_roadmap
     from mobee.robot.join import join_robots
     from mobee.robot.load import load_robot
@@ -51,32 +47,28 @@ _MODULES = {
     "mobee.errors": "ActionInterrupted BatchInterrupted InvalidValue MobeeError RobotFileError UnknownName",
     "mobee.learning.agent": "CuriousAgent run",
     "mobee.learning.lattice": "Lattice",
-    "mobee.learning.grid": "Grid",
     "mobee.learning.learner": "CuriousSettings",
-    "mobee.learning.object_space": "ObjectSpace",
+    "mobee.learning.object_space": "Grid ObjectSpace",
     "mobee.learning.planner": "Plan Planner",
     "mobee.learning.reaching.learner": "ReachSettings",
     "mobee.learning.reaching.reach_agent": "ReachAgent",
-    "mobee.learning.space": "Space",
+    "mobee.learning.space": "Space Voronoi",
     "mobee.learning.transitions": "TransitionModel",
     "mobee.learning.value_iteration": "policy_iteration value_iteration",
-    "mobee.learning.voronoi": "Voronoi",
     "mobee.model": "Contact Geometry World WorldObject box capsule cylinder sphere",
     "mobee.model.model": "Model",
     "mobee.model.pose": "Pose",
     "mobee.plant": "Outcome PerceivingPlant Plant",
     "mobee.reach": "ReachOutcome ReachPlant ReachTarget",
-    "mobee.roadmap.adaptive.adaptive": "AdaptiveRoadmap",
-    "mobee.roadmap.adaptive.edge_beliefs": "roadmap_space",
-    "mobee.roadmap.adaptive.explorer": "MapExplorer",
-    "mobee.roadmap.adaptive.walker": "Walker",
+    "mobee.roadmap.adaptive.adaptive": "AdaptiveRoadmap roadmap_space",
+    "mobee.roadmap.adaptive.walker": "MapExplorer Walker",
     "mobee.roadmap.building": "tasks",
-    "mobee.roadmap.building.build": "build_roadmap",
-    "mobee.roadmap.building.settings": "RoadmapSettings SearchSettings",
+    "mobee.roadmap.building.build": "RoadmapSettings build_roadmap",
+    "mobee.roadmap.building.search_scheduler": "SearchSettings",
     "mobee.roadmap.evolution.nes": "NES",
     "mobee.roadmap.evolution.search": "Restart minimize",
     "mobee.roadmap.ik": "costs",
-    "mobee.roadmap.ik.ngik": "IK solve_ik",
+    "mobee.roadmap.ik.solve": "IK solve_ik",
     "mobee.roadmap.roadmap": "Roadmap load_roadmap",
     "mobee.robot.join": "join_robots",
     "mobee.robot.load": "load_robot",

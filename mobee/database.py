@@ -1,20 +1,29 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Opens the SQLite file of a run, and converts SQLite errors into MobeeErrors with a message of one line.
+"""The SQLite file of a run: opens it, locks the data of an agent for one process, and reports errors of SQLite in one line.
 
 In a run one or several agents learn; the file holds what they have recorded, such as transitions and reaches.
+
+A lock lets only one process write the data of an agent; when a process ends, its locks end too. A lock covers one byte of a second file,
+named as the data file with "-lock" appended. The operating system gives such a lock to a process, not to a descriptor. So the same process
+may lock a byte twice; and if it closes any descriptor of the file, all its locks on the file end. Therefore a process opens the file only
+once and counts its locks.
 """
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import sqlite3
 import time
+import zlib
+from collections import Counter
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from mobee.errors import MobeeError, NoRoom
+from mobee.errors import InUse, MobeeError, NoRoom
 
 SCHEMA = 1
 APPLICATION_ID = 0x4D6F4265  # "MoBe": marks the file as ours
@@ -37,6 +46,7 @@ REMEDIES = {
     "SQLITE_CORRUPT": DAMAGED,
     "SQLITE_CONSTRAINT": "another process writes transitions of the same agent; run one process an agent",
 }
+FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
 def opened(path: Path, read_only: bool, durable: bool = True) -> sqlite3.Connection:
@@ -164,3 +174,68 @@ def _write_ahead(database: sqlite3.Connection) -> None:
             if not error.sqlite_errorname.startswith("SQLITE_BUSY") or time.monotonic() > deadline:
                 raise
             time.sleep(0.01)
+
+
+try:
+    import fcntl
+except ImportError:  # no such locks on this system: nothing is excluded
+    fcntl = None  # type: ignore[assignment]  # mypy expects a module here
+
+
+class _LockFile:
+    """The file of locks beside one file, as this process has it open."""
+
+    def __init__(self, path: Path) -> None:
+        self.descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        self.held: Counter[str] = Counter()
+
+
+_open: dict[Path, _LockFile] = {}
+
+
+def lock(path: Path, name: str) -> None:
+    """Lock the data of the agent `name` in the file `path` against other processes.
+
+    Raises InUse while another process holds the lock, NoRoom if the disk is full, MobeeError if no lock can be made for another reason.
+    On a system without such locks (no module fcntl) nothing is done.
+    """
+    if fcntl is None:
+        return
+    where = path.with_name(path.name + "-lock").absolute()
+    try:
+        file = _open.get(where) or _open.setdefault(where, _LockFile(where))
+        fcntl.lockf(file.descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, _byte(name))
+    except OSError as error:
+        is_open = where in _open
+        if is_open:
+            _close_if_unused(where)
+        if is_open and isinstance(error, BlockingIOError | PermissionError):
+            raise InUse(
+                f"{path}: another process writes the data of {name}: end it first (`mobee status` shows the systems that run), "
+                "or use another file or run folder."
+            ) from None
+        kind = NoRoom if error.errno in FULL else MobeeError
+        raise kind(f"{path}: {where.name} beside it cannot be {'locked' if is_open else 'made'} ({error.strerror}).") from None
+    file.held[name] += 1
+
+
+def unlock(path: Path, name: str) -> None:
+    """Undo one call of `lock` with the same arguments; the data are unlocked after as many calls of `unlock`. Never raises an error."""
+    where = path.with_name(path.name + "-lock").absolute()
+    file = _open.get(where)
+    if file is None or fcntl is None or not file.held[name]:
+        return
+    file.held[name] -= 1
+    if not file.held[name]:
+        with suppress(OSError):  # a lock that cannot be released ends when this process closes the file
+            fcntl.lockf(file.descriptor, fcntl.LOCK_UN, 1, _byte(name))
+    _close_if_unused(where)
+
+
+def _close_if_unused(where: Path) -> None:
+    if not any(_open[where].held.values()):
+        os.close(_open.pop(where).descriptor)
+
+
+def _byte(name: str) -> int:
+    return zlib.crc32(name.encode())

@@ -13,9 +13,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from mobee.database import damaged, explained, json_of, opened, transaction
+from mobee.database import damaged, explained, json_of, lock, opened, transaction, unlock
 from mobee.errors import MobeeError
-from mobee.write_locks import lock, unlock
 
 
 class AgentFile:

@@ -22,8 +22,7 @@ from mobee.errors import ActionInterrupted
 from mobee.model.model import Model
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
-from mobee.vision.calibration.calibration import Calibration
-from mobee.vision.calibration.observations import Observation
+from mobee.vision.calibration.calibration import Calibration, Observation
 from mobee.vision.calibration.offline import MOVING, RESTING, moved_parts
 from mobee.vision.calibration.postures import choose_postures
 from mobee.vision.calibration.solve import calibrate

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from mobee.check import Finding, UntestedGroup, check_file, untested_groups
-from mobee.check.finding import SEVERITIES, count, length
+from mobee.check.interface import SEVERITIES, count, length
 from mobee.check.touching import POSES, LeftOut, TouchingPair, leave_out_touching, touching_pairs
 from mobee.errors import MobeeError
 from mobee.model.world import World

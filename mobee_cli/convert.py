@@ -11,7 +11,7 @@ import argparse
 import warnings
 from pathlib import Path
 
-from mobee.check.file import world_file
+from mobee.check.run import world_file
 from mobee.errors import MobeeError
 from mobee.model.world import World
 from mobee.model.world_file import load_world

@@ -12,10 +12,10 @@ from time import perf_counter
 
 from experiments.kit.command_line import Progress, positive_whole
 from mobee.errors import MobeeError, NotInstalled
-from mobee.vision.objects.color import by_color
-from mobee.vision.objects.learned.detector import by_network
-from mobee.vision.objects.learned.judging import Quality, judge
+from mobee.vision.objects.detection import by_color
+from mobee.vision.objects.detectors import by_network
 from mobee.vision.objects.learned.network import SUFFIX, Network
+from mobee.vision.objects.learned.pictures import Quality, judge
 from mobee.vision.objects.learned.training import PICTURES, held_out, train
 from mobee.vision.objects.thing import things_in
 from mobee_cli.errors import UserError

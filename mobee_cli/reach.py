@@ -16,15 +16,14 @@ import numpy as np
 from mobee.arrays import Array
 from mobee.control.reach import marker_error
 from mobee.errors import ActionInterrupted, MobeeError, UnknownName
-from mobee.learning.reaching.evaluation import move
 from mobee.learning.reaching.failures import has_failed
-from mobee.learning.reaching.reach_agent import ReachAgent
+from mobee.learning.reaching.reach_agent import ReachAgent, move
 from mobee.learning.reaching.record import load_reaches
 from mobee.learning.reaching.store import reaching_parts
 from mobee.model.model import Model
 from mobee.model.world import World
 from mobee.reach import AIMS, RADIUS, Aim, ReachPlant, ReachTarget, reward_of
-from mobee.roadmap.reachable import body_at, nearest_outside, nearest_posture
+from mobee.roadmap.ik.solve import body_at, nearest_outside, nearest_posture
 from mobee.robot.robot import Robot
 from mobee.simulation import OfflinePlant
 from mobee.store import STORE

@@ -11,7 +11,7 @@ import numpy as np
 
 from mobee.arrays import Array
 from mobee.reach import ReachOutcome, ReachTarget
-from mobee.roadmap.reachable import Nearest
+from mobee.roadmap.ik.solve import Nearest
 
 REACHED_DISTANCE = 0.02  # m from the target's surface, within which the target is reached
 _COLUMNS = 80

@@ -12,8 +12,8 @@ import numpy as np
 
 from experiments.bench.peers import import_peer, make_searches_precise
 from mobee.arrays import Array, Ints
+from mobee.model.engine import NO_HANDS, Snapshot
 from mobee.model.fcl_engine import tested_pairs  # raises NotInstalled without python-fcl
-from mobee.model.snapshot import NO_HANDS, Snapshot
 from mobee.model.world_object import WorldObject
 from mobee.robot.robot import Robot, Shape
 

@@ -20,9 +20,8 @@ from experiments.bench.peers import CmaStrategy, import_peer
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
 from mobee.roadmap.evolution.search import Restart, Search
-from mobee.roadmap.ik.least_squares import NEAR
-from mobee.roadmap.ik.ngik import STD
 from mobee.roadmap.ik.problem import Problem
+from mobee.roadmap.ik.solve import NEAR, STD
 from mobee.roadmap.ik.terms import Term
 from mobee.robot.robot import Robot
 

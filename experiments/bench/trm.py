@@ -22,7 +22,7 @@ from experiments.claims.ch3_roadmaps.trm_tasks import PREGRASP_SPACING, pregrasp
 from experiments.kit.command_line import Progress
 from experiments.kit.roadmap_task import Example
 from mobee.arrays import Array
-from mobee.roadmap.building.settings import MAX_TURN
+from mobee.roadmap.building.build import MAX_TURN
 from mobee.roadmap.graph import nearest, short
 from mobee.roadmap.roadmap import Roadmap
 

@@ -15,7 +15,7 @@ import mobee
 from mobee import Geometry, Model, Robot, World, costs
 from mobee.arrays import Array
 from mobee.rendering.sheet import View
-from mobee.roadmap.building.settings import MAX_TURN
+from mobee.roadmap.building.build import MAX_TURN
 from mobee.roadmap.building.tasks import Task
 from mobee.roadmap.ik.terms import Term
 from mobee.roadmap.roadmap import Roadmap

@@ -16,11 +16,11 @@ from pathlib import Path
 from typing import Any
 
 from mobee.errors import NotInstalled
-from mobee.learning.beliefs import PREDICTABLE_SHARE, PREDICTABLE_TRIES, probability_of, surprise_of
 from mobee.learning.learner import WATCHERS, CuriousLearner
 from mobee.learning.record import model_from, space_from
 from mobee.learning.space import Space
 from mobee.learning.transitions import TransitionModel
+from mobee.learning.value_iteration import PREDICTABLE_SHARE, PREDICTABLE_TRIES, probability_of, surprise_of
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
 from mobee.store import STORE, Transition, TransitionStore

@@ -17,7 +17,7 @@ from mobee.robot.join import join_robots
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
 from mobee.robot.urdf.shapes import grown
-from mobee.vision.teaching.postures import Carried
+from mobee.vision.teaching.lessons import Carried
 
 ICUB, KATANA = ("torso", "head", "left_arm", "right_arm"), ("katana_arm", "katana_hand")
 """The names of the parts of each robot, as in the joined robot."""

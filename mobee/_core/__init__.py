@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The native core: a shared library, built from the sources in core/, called through ctypes.
+"""The native core: loads its shared library, built from the sources in core/, and passes arrays to its functions through ctypes.
 
-Each module here declares the functions of the C++ files that its first line names. The core receives addresses of arrays and does not
-check the arrays: the callers do.
+Each module here declares the functions of the C++ files that its first line names. The core receives addresses of arrays, addresses with
+lengths (`View`) and tables of C structures, and does not check them: the callers do.
 """
 
 from __future__ import annotations
@@ -29,12 +29,22 @@ from mobee._core.levels import (
     possible_levels,
     processor_flags,
 )
+from mobee.arrays import Array, Ints
 from mobee.errors import NotInstalled, UnknownName
 
 INTEGER, REAL, ADDRESS = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
 BYTES = ctypes.c_char_p
 """The ctypes type of an argument that is given as `array.tobytes()` and only read by the core; for a few numbers it is faster than an
 address."""
+
+Table = np.ndarray[tuple[int, ...], np.dtype[np.void]]
+"""An array of structures of the core: `table["low"]` is a view of the member `low` of all structures."""
+
+WHOLE = "i8"
+INTERVAL = np.dtype([("first", WHOLE), ("end", WHOLE)])
+
+NUMBERS, REALS = 6, 7  # of a contact: pose, kind, first, second, their links; depth, normal, point
+ROW_BYTES = 8 * (NUMBERS + REALS)
 
 _NOTHING: Any = ctypes.c_char * 0
 
@@ -126,6 +136,30 @@ def address(array: NDArray[Any]) -> int:
     return array.ctypes.data
 
 
+class View(ctypes.Structure):
+    """The address and the length of an array, as an argument of the core; the caller keeps the array alive."""
+
+    _fields_ = (("data", ADDRESS), ("size", INTEGER))
+
+
+def view(array: Array | Ints | Table) -> View:
+    """Return the address and the length of a C-contiguous array; the caller must keep the array alive while the core uses it."""
+    return View(address(array), len(array))
+
+
+def columns(*names: str, whole: tuple[str, ...] = ()) -> np.dtype[np.void]:
+    """Return the NumPy type of a structure of the core: a double for each of `names`, then a 64-bit integer for each of `whole`."""
+    return np.dtype([*((name, "f8") for name in names), *((name, WHOLE) for name in whole)])
+
+
+def numbers(values: Array, count: int) -> bytes:
+    """Return the numbers `values` (count,) as bytes, for a function of the core that only reads them; ValueError for another shape."""
+    given = np.asarray(values, dtype=np.float64)
+    if given.shape != (count,):
+        raise ValueError(f"an array of shape {given.shape}: must be ({count},)")
+    return given.tobytes()
+
+
 def _is_checkout() -> bool:
     return (SOURCES / "interface.hpp").exists()
 
@@ -136,4 +170,23 @@ def _remedy(level: str) -> str:
     return f"run {Path(sys.executable).name} {SOURCES / 'build.py'}" + (" --sanitize" if level == SANITIZED else "")
 
 
-__all__ = ["ADDRESS", "BYTES", "INTEGER", "REAL", "CoreUnavailable", "address", "function", "library"]
+__all__ = [
+    "ADDRESS",
+    "BYTES",
+    "INTEGER",
+    "INTERVAL",
+    "NUMBERS",
+    "REAL",
+    "REALS",
+    "ROW_BYTES",
+    "WHOLE",
+    "CoreUnavailable",
+    "Table",
+    "View",
+    "address",
+    "columns",
+    "function",
+    "library",
+    "numbers",
+    "view",
+]

@@ -14,9 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mobee._core import ADDRESS, BYTES, INTEGER, REAL, address, function
+from mobee._core import ADDRESS, BYTES, INTEGER, NUMBERS, REAL, REALS, ROW_BYTES, address, function
 from mobee._core.narrow import VOLUME
-from mobee._core.tables import NUMBERS, REALS, ROW_BYTES
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -137,7 +136,7 @@ _swung = function("swung", ADDRESS, ADDRESS, ADDRESS, ADDRESS)
 def robot(numbers: Mapping[str, float], arrays: Mapping[str, NDArray[Any]]) -> Handle:
     """Make a robot in the compiled core from tables, which the core copies; return the handle that owns the robot.
 
-    `numbers`, `arrays`: the single numbers and the arrays of the tables, by name, as `mobee.model.robot_tables.RobotTables.for_core`
+    `numbers`, `arrays`: the single numbers and the arrays of the tables, by name, as `mobee.model.core_tables.RobotTables.for_core`
     returns them.
     """
     tables = _RobotTables(**numbers, **{name: address(array) for name, array in arrays.items()})
@@ -148,7 +147,7 @@ def scene(of: Handle, volumes: NDArray[Any], roles: Ints, carried: Ints, side: i
     """Make a scene in the compiled core, that is, a robot and the objects of a world; return the handle that owns the scene.
 
     `of`: handle of the robot. `volumes` (N,) and `roles` (N,): volume and role of each object of the world, as in
-    `mobee.model.snapshot.Snapshot`. `carried`: indices of the objects that the robot carries. `side`: number of cells along the longest
+    `mobee.model.engine.Snapshot`. `carried`: indices of the objects that the robot carries. `side`: number of cells along the longest
     side of the grid into which the core sorts the obstacles and targets that the robot does not carry.
     """
     tables = _WorldTables(len(roles), len(carried), side, address(volumes), address(roles), address(carried))
@@ -201,7 +200,7 @@ class Room:
         The contacts are two arrays: numbers (c, 6) and reals (c, 7), the columns of `mobee.model.contact.ContactTable`. The projection is
         the sum of J^T (depth * normal) over the contacts of fields; J is the Jacobian of the contact's point. A field is a volume that
         causes a repulsive force. `scene`: handle of the scene. `hands`: up to two reaching hands as four link indices, two for each hand,
-        as `mobee.model.snapshot.hand_numbers` returns them; their contacts with targets are ignored. `cut`: True: a contact acts only on
+        as `mobee.model.engine.hand_numbers` returns them; their contacts with targets are ignored. `cut`: True: a contact acts only on
         the motors of the part that touches, as in the MoBeE program of 2014; False: also on the motors nearer to the base. `threads`:
         number of threads.
         """
@@ -214,7 +213,7 @@ class Room:
         """Set the scene, the reaching hands and `cut` for the next calls of `evaluate_one`.
 
         `scene`: handle of the scene; the caller keeps it alive. `hands`: up to two hands as four link indices, two for each hand, as
-        `mobee.model.snapshot.hand_numbers` returns them; their contacts with targets are ignored. `cut`: True: a contact acts only on the
+        `mobee.model.engine.hand_numbers` returns them; their contacts with targets are ignored. `cut`: True: a contact acts only on the
         motors of the touching link's own part; False: also on the motors nearer to the base.
         """
         self._request.scene, self._request.hands[:], self._request.cut = scene.at, hands, cut
@@ -243,7 +242,7 @@ class Following:
         """Set the scene and the reaching hands for the poses that are evaluated next.
 
         `scene`: handle of the scene, which is kept alive. `hands`: up to two hands as four link indices, two for each hand, as
-        `mobee.model.snapshot.hand_numbers` returns them; their contacts with targets are ignored.
+        `mobee.model.engine.hand_numbers` returns them; their contacts with targets are ignored.
         """
         self._scene = scene  # before the core releases the last one, which has no other user
         numbers = (INTEGER * 4)(*hands)

@@ -9,8 +9,7 @@ from itertools import count, takewhile
 
 import numpy as np
 
-from mobee._core import ADDRESS, INTEGER, REAL, function
-from mobee._core.tables import INTERVAL, WHOLE, View, columns
+from mobee._core import ADDRESS, INTEGER, INTERVAL, REAL, WHOLE, View, columns, function
 
 MOTOR_GAINS = columns(
     "low", "high", "max_spring", "spring_knee", "damping", "limit_slope", "low_zone", "high_zone", "client_slope", "max_client",

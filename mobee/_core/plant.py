@@ -8,8 +8,7 @@ from functools import cache
 
 import numpy as np
 
-from mobee._core import ADDRESS, BYTES, INTEGER, REAL, function, law
-from mobee._core.tables import INTERVAL, WHOLE, View, columns
+from mobee._core import ADDRESS, BYTES, INTEGER, INTERVAL, REAL, WHOLE, View, columns, function, law
 
 CONSTANTS = columns(
     "low", "high", "max_velocity", "max_acceleration", "max_torque", "response", "half_backlash", "friction", whole=("delay",)

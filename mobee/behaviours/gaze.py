@@ -19,12 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mobee.arrays import Array, Ints
-from mobee.behaviours.reference import Reference
+from mobee.behaviours.tracking import Reference
 from mobee.errors import InvalidValue
 from mobee.model.kinematics import cross, joint_axes, link_transforms, tables
 from mobee.robot.cameras import camera_frame
-from mobee.robot.robot import Robot
-from mobee.robot.visual import Camera
+from mobee.robot.robot import Camera, Robot
 
 Phase = Literal["saccade", "pursuit"]
 

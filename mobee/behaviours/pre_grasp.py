@@ -21,8 +21,7 @@ from mobee.behaviours.pick import FAST, Body, Picker, PreGrasp, Upright, is_free
 from mobee.errors import MobeeError
 from mobee.model.model import Model
 from mobee.roadmap.building import tasks
-from mobee.roadmap.building.build import build_roadmap
-from mobee.roadmap.building.settings import RoadmapSettings
+from mobee.roadmap.building.build import RoadmapSettings, build_roadmap
 from mobee.roadmap.ik import costs
 from mobee.roadmap.roadmap import Roadmap
 from mobee.robot.robot import Robot

@@ -9,8 +9,7 @@ from itertools import chain, islice, product
 import numpy as np
 
 from mobee.arrays import Array
-from mobee.check.finding import Finding, some
-from mobee.check.subject import Subject
+from mobee.check.interface import Finding, Subject, some
 from mobee.control.gains import Gains
 from mobee.control.law import stack_clauses
 from mobee.robot.robot import Clause

@@ -7,8 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from mobee.check.finding import Finding, count, interval, motor_interval, position, some
-from mobee.check.subject import Subject
+from mobee.check.interface import Finding, Subject, count, interval, motor_interval, position, some
 from mobee.control.gains import Gains
 from mobee.robot.motor_units import motor_units, outside_zones
 from mobee.robot.robot import Motor

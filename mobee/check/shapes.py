@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks the shapes of a robot.
+"""Checks the shapes and the visuals of a robot.
 
 It finds fields (volumes that cause repulsive forces) that do not enclose the solids of their link, hulls with few corners that are much
-larger than the exact ones, and duplicates.
+larger than the exact ones, duplicates, and mesh files of visuals (drawn surfaces) that do not exist.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from itertools import combinations
 import numpy as np
 
 from mobee.arrays import Array
-from mobee.check.finding import Finding, count, length, some
-from mobee.check.subject import Subject
+from mobee.check.interface import Finding, Subject, count, length, some
 from mobee.robot.robot import Robot, Shape
+from mobee.robot.urdf.mesh import first_file, mesh_places, searched
 
 BALL = 96  # points on a sphere
 RING = 24  # points on a circle
@@ -239,3 +239,19 @@ def _root_vertices(shape: Shape) -> Array:
     """Return the vertices (v, 3) of a convex shape in the root frame at zero pose."""
     corners: Array = np.asarray(shape.vertices) @ shape.rotation.T + shape.position
     return corners
+
+
+def missing_meshes(subject: Subject) -> Iterator[Finding]:
+    """Yield one finding if mesh files of the robot's visuals (its drawn surfaces) do not exist."""
+    sources = dict.fromkeys(visual.mesh for visual in subject.robot.visuals if visual.mesh is not None)
+    missing = [one for one in sources if first_file(mesh_places(one.file, one.robot_file)) is None]
+    if missing:
+        first = missing[0]
+        yield Finding(
+            "warning",
+            "missing-meshes",
+            f"{first.robot_file}:{first.line}",
+            f"meshes that are drawn are missing: {some([repr(one.file) for one in missing])}",
+            f"solids are shown instead, where nothing else is (looked at {searched(mesh_places(first.file, first.robot_file))})",
+            "put the files there, correct their names, or name the folder of their package in ROS_PACKAGE_PATH",
+        )

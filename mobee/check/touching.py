@@ -15,15 +15,14 @@ from typing import Any, Literal
 import numpy as np
 
 from mobee.arrays import Array, Ints
-from mobee.check.finding import Finding, count, length, some
-from mobee.check.subject import SEED, Subject
+from mobee.check.interface import SEED, Finding, Subject, count, length, some
 from mobee.errors import InvalidValue, RobotFileError
 from mobee.model.contact import Contact
 from mobee.model.model import Model
 from mobee.robot.load import ROBOTS, find_file, load_robot
 from mobee.robot.robot import LinkPair, Robot, Shape
 from mobee.robot.urdf.srdf import find_srdf
-from mobee.robot.urdf.write_srdf import disabled_and_enabled, write_disabled
+from mobee.robot.urdf.write import disabled_and_enabled, write_disabled
 from mobee.robot.xml.file import is_file
 from mobee.robot.xml.node import read_xml
 

@@ -3,6 +3,8 @@
 
 from mobee.control.controller import Controller as Controller
 from mobee.control.forces import Forces as Forces
+from mobee.control.forces import State as State
+from mobee.control.forces import Term as Term
 from mobee.control.forces import constraint_forces as constraint_forces
 from mobee.control.gains import Gains as Gains
 from mobee.control.gains import Settle as Settle
@@ -11,5 +13,3 @@ from mobee.control.law import Command as Command
 from mobee.control.reach import Reacher as Reacher
 from mobee.control.reach import ReachPath as ReachPath
 from mobee.control.reach import reach_path as reach_path
-from mobee.control.terms import State as State
-from mobee.control.terms import Term as Term

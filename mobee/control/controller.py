@@ -9,18 +9,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from mobee._core import Table
 from mobee._core.law import state_term_names, term_names
-from mobee._core.tables import Table
 from mobee.arrays import Array
-from mobee.control.forces import Forces, Propagate, checked, checked_force, forces_of
+from mobee.control.forces import Forces, Propagate, State, Term, checked, checked_force, forces_of, valid_terms
 from mobee.control.gains import Gains
-from mobee.control.law import Command, Law, Modality
-from mobee.control.reaches import Reaches
-from mobee.control.stability import largest_step, require_stable
-from mobee.control.terms import State, Term, valid_terms
+from mobee.control.law import Command, Law, Modality, largest_step, require_stable
+from mobee.control.reach import Reaches
 from mobee.errors import InvalidValue, UnknownName
+from mobee.model.engine import MAX_HANDS
 from mobee.model.masses import gravity_torque
-from mobee.model.snapshot import MAX_HANDS
 from mobee.robot.motor_units import motor_units
 
 if TYPE_CHECKING:

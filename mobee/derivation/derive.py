@@ -13,11 +13,8 @@ import numpy as np
 
 from mobee.arrays import Array
 from mobee.control.gains import Gains
-from mobee.derivation.chains import Chain, chains
-from mobee.derivation.cuts import with_cuts
-from mobee.derivation.joints import bounded, joints_to_learn, movements
-from mobee.derivation.names import names_of
-from mobee.derivation.pairs import field_width, free_home, home_apart, often_touching, reach_of, with_fields, without_links
+from mobee.derivation.arms import Chain, bounded, chains, joints_to_learn, movements, names_of
+from mobee.derivation.separation import field_width, free_home, home_apart, often_touching, reach_of, with_cuts, with_fields, without_links
 from mobee.errors import InvalidValue
 from mobee.learning.lattice import Lattice
 from mobee.robot.robot import Clause, Part, Robot

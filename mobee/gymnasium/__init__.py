@@ -20,16 +20,14 @@ if importlib.util.find_spec("gymnasium") is None:
 from mobee.gymnasium.registration import register_envs as _register_envs
 
 if TYPE_CHECKING:
-    from mobee.gymnasium.env_plant import EnvPlant
+    from mobee.gymnasium.discrete import EnvPlant, TabularEnv
     from mobee.gymnasium.lattice import LatticeEnv, LatticeTask, LatticeVectorEnv
     from mobee.gymnasium.reach import ReachEnv, ReachTask, ReachVectorEnv
     from mobee.gymnasium.table import TableEnv, TableTask
-    from mobee.gymnasium.tabular import TabularEnv
 
 _MODULES = {
-    "mobee.gymnasium.env_plant": "EnvPlant",
+    "mobee.gymnasium.discrete": "EnvPlant TabularEnv",
     "mobee.gymnasium.lattice": "LatticeEnv LatticeTask LatticeVectorEnv",
-    "mobee.gymnasium.tabular": "TabularEnv",
     "mobee.gymnasium.reach": "ReachEnv ReachTask ReachVectorEnv",
     "mobee.gymnasium.table": "TableEnv TableTask",
 }

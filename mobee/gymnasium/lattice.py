@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
 from mobee.gymnasium.registration import LATTICE_STEPS
-from mobee.gymnasium.robots import ARM, FRAMES_PER_S, SEEDS, Portrait, RobotFile, WorldFile, model_of, plant_settings
-from mobee.gymnasium.vector import RobotVectorEnv
+from mobee.gymnasium.robots import ARM, FRAMES_PER_S, SEEDS, Portrait, RobotFile, RobotVectorEnv, WorldFile, model_of, plant_settings
 from mobee.learning.goal import target_states
 from mobee.learning.lattice import Lattice, Levels
 from mobee.learning.transitions import TransitionModel

@@ -18,8 +18,18 @@ from numpy.typing import ArrayLike, NDArray
 from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue, MobeeError
 from mobee.gymnasium.registration import REACH_STEPS
-from mobee.gymnasium.robots import ARM, FRAMES_PER_S, SEEDS, Portrait, RobotFile, WorldFile, guarded, model_of, plant_settings
-from mobee.gymnasium.vector import RobotVectorEnv
+from mobee.gymnasium.robots import (
+    ARM,
+    FRAMES_PER_S,
+    SEEDS,
+    Portrait,
+    RobotFile,
+    RobotVectorEnv,
+    WorldFile,
+    guarded,
+    model_of,
+    plant_settings,
+)
 from mobee.learning.space import checked_joints
 from mobee.model.model import Model
 from mobee.rendering.picture import Picture

@@ -18,6 +18,6 @@ def register_envs() -> None:
             module = f"{here}.{name.lower()}"
             register(env_id, f"{module}:{name}Env", max_episode_steps=steps, vector_entry_point=f"{module}:{name}VectorEnv")
     if RIVER_SWIM not in registry:
-        register(RIVER_SWIM, f"{here}.tabular:river_swim_env", max_episode_steps=RIVER_SWIM_STEPS)
+        register(RIVER_SWIM, f"{here}.discrete:river_swim_env", max_episode_steps=RIVER_SWIM_STEPS)
     if DEEP_SEA not in registry:
-        register(DEEP_SEA, f"{here}.tabular:deep_sea_env")
+        register(DEEP_SEA, f"{here}.discrete:deep_sea_env")

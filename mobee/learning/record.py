@@ -9,12 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from mobee.errors import InvalidValue, MobeeError, UnknownName
-from mobee.learning.grid import Grid
 from mobee.learning.lattice import Lattice
-from mobee.learning.object_space import ObjectSpace
-from mobee.learning.space import Space
+from mobee.learning.object_space import Grid, ObjectSpace
+from mobee.learning.space import Space, Voronoi
 from mobee.learning.transitions import TransitionModel
-from mobee.learning.voronoi import Voronoi
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
 from mobee.store import TransitionStore

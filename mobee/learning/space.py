@@ -1,25 +1,36 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The state-action space of one part: states are the Voronoi cells of samples, and actions aim at samples (thesis 6.2, 6.3)."""
+"""The state-action space of one part: states are the Voronoi cells of samples, and actions aim at samples (thesis 6.2, 6.3).
+
+`Space` has given samples and goals. `Voronoi` draws its samples at random, and its actions aim at the nearest samples. `pruned` and
+`with_shortcuts` adapt a space to observed transitions: without unreachable states, and with shortcuts (thesis 9.4.5).
+"""
 
 from __future__ import annotations
 
 import hashlib
+from collections import Counter
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cached_property
 from math import isfinite
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mobee.arrays import Array, Ints, real_array
 from mobee.errors import InvalidValue
-from mobee.learning.neighbours import NO_ACTION, nearest_finder
+from mobee.learning.neighbours import NO_ACTION, edges_of, joined, nearest_finder, nearest_goals, table_of
 from mobee.plant import Outcome
 from mobee.robot.robot import Part, Robot
 
+if TYPE_CHECKING:
+    from mobee.store import Transition
+
 MAX_STATES = 100_000  # a larger space takes too long to explore on a robot (thesis 7.4)
 NEIGHBOURS = 16  # of each state, as in the thesis' arms
+MIN_ATTEMPTS = 5  # actions towards a state that was never reached, after which it counts as unreachable
+SHORTCUT_SPAN = 4  # transitions on a path between the two states of a shortcut, at most
 
 
 class Space:
@@ -173,6 +184,122 @@ class Space:
         return state
 
 
+class Voronoi(Space):
+    """A space whose samples are drawn at random, or given; actions aim at the nearest samples.
+
+    A state is the Voronoi cell of its sample. Distances are in fractions of the joint ranges. To make thousands of states takes seconds;
+    memory grows in proportion to their number.
+
+    Args:
+        robot: the robot; samples are drawn within its motor limits.
+        joints: motor names, all of one part.
+        samples: number of samples to draw uniformly in the joint ranges, or the samples themselves, shape (S, d), in [rad].
+        seed: seed of the random samples; ignored if the samples are given.
+        neighbours: number of nearest samples to which each state has actions. None: 16, or all others if there are fewer.
+        tie_seed: if several samples are equally near, but not all of them become neighbours, a random choice with this seed decides.
+        rest: fraction of its range at which each other motor of the part stays.
+
+    Raises:
+        InvalidValue, UnknownName: an argument is out of its range or unknown; the message states the valid ones.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        joints: Sequence[str],
+        samples: int | ArrayLike,
+        seed: int = 0,
+        neighbours: int | None = None,
+        tie_seed: int = 0,
+        rest: float = 0.5,
+    ) -> None:
+        _, indices = checked_joints(robot, joints)
+        limits = robot.limits[indices]
+        drawn = isinstance(samples, (int, np.integer))
+        poses = _drawn_samples(samples, limits, seed) if drawn else _checked_within(samples, limits, joints)
+        self.seed, self.tie_seed = seed if drawn else None, tie_seed
+        self.neighbours = checked_neighbours(neighbours, len(poses))
+        goals: Ints = nearest_goals((poses - limits[:, 0]) / np.ptp(limits, axis=1), self.neighbours, tie_seed)
+        super().__init__(robot, joints, poses, goals, rest)
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """The constructor's arguments and a hash of the space, as JSON values.
+
+        `mobee.learning.record.space_from` rebuilds the space from them.
+        """
+        samples = len(self) if self.seed is not None else self.samples.tolist()
+        made = {"samples": samples, "seed": self.seed, "neighbours": self.neighbours, "tie_seed": self.tie_seed}
+        return self._made | made | {"kind": "voronoi"}
+
+
+def pruned(space: Space, transitions: Sequence[Transition], seen: int = MIN_ATTEMPTS) -> tuple[Space, Ints]:
+    """Return the space without unreachable states, and the new number of each state, (S,), -1 for a removed state.
+
+    A state is unreachable if it was the goal of at least `seen` of the transitions, and no transition started or ended in it. States whose
+    actions all lead to removed states are removed too. Raises InvalidValue if fewer than two states would remain.
+    """
+    aimed, reached = np.zeros(len(space), dtype=int), np.zeros(len(space), dtype=bool)
+    for made in transitions:
+        aimed[space.goal(made.s, made.a)] += 1
+        reached[[made.s, made.s_next]] = True
+    kept = reached | (aimed < seen)
+    edges = edges_of(space.goals)
+    while True:  # a state without actions is removed, too
+        left = [(s, g) for s, g in edges if kept[s] and kept[g]]
+        out = np.zeros(len(space), dtype=bool)
+        out[[s for s, _ in left]] = True
+        if (kept == (kept & out)).all():
+            break
+        kept &= out
+    if kept.sum() < 2:
+        raise InvalidValue(f"of {len(space)} states {kept.sum()} were reached: observe more before pruning.")
+    number = np.where(kept, np.cumsum(kept) - 1, -1)
+    table = table_of([(int(number[s]), int(number[g])) for s, g in left], int(kept.sum()))
+    return Space(space.robot, space.joints, space.samples[kept], table, space.rest), number
+
+
+def with_shortcuts(space: Space, transitions: Sequence[Transition], count: int, span: int = SHORTCUT_SPAN) -> Space:
+    """Return a space with more actions: shortcuts between states that often followed each other within a few transitions.
+
+    `transitions`: the transitions of an agent, in order; consecutive ones form a path, from which loops are removed. `count`: number of
+    pairs of states that get a shortcut in both directions: the pairs that occurred most often on the path and have no action yet. `span`:
+    largest number of transitions on the path between the two states of a pair.
+    """
+    known = set(edges_of(space.goals))
+    path: list[int] = []
+    passed: Counter[tuple[int, int]] = Counter()
+    for made in transitions:
+        if not path or path[-1] != made.s:
+            path = [made.s]
+        if made.s_next in path:
+            path = path[: path.index(made.s_next)]  # without the loop
+        path = [*path[-span:], made.s_next]
+        passed.update((min(one, path[-1]), max(one, path[-1])) for one in path[:-2] if (one, path[-1]) not in known)
+    best = sorted(passed, key=lambda pair: (-passed[pair], pair))[:count]
+    edges = joined([*known, *best, *((goal, state) for state, goal in best)])
+    return Space(space.robot, space.joints, space.samples, table_of(edges, len(space)), space.rest)
+
+
+def carried(transitions: Sequence[Transition], old: Space, new: Space) -> list[Transition]:
+    """Convert transitions of the space `old` to the space `new`, which must have the same joints; return the converted transitions.
+
+    Start and goal of a transition become the states of `new` with the same samples. A transition is left out if `new` lacks one of these
+    states, or has no action from the start to the goal. The end of a transition becomes the state of `new` that contains the pose recorded
+    there. The transitions are numbered again from 1.
+    """
+    same = {state: new.state_of_joints(sample) for state, sample in enumerate(old.samples)}
+    same = {before: now for before, now in same.items() if np.array_equal(old.samples[before], new.samples[now])}
+    found: list[Transition] = []
+    for made in transitions:
+        state, goal = same.get(made.s), same.get(old.goal(made.s, made.a))
+        row = [] if state is None else new.actions(state).tolist()
+        if state is not None and goal in row:
+            ended = new.state_of(made.q)
+            found.append(replace(made, n=len(found) + 1, s=state, a=row.index(goal), s_next=ended))
+    return found
+
+
 def checked_joints(robot: Robot, joints: Sequence[str]) -> tuple[Part, Ints]:
     """Return the part (group of motors) of `joints`, which are names of motors, and their indices among the robot's motors, (d,).
 
@@ -222,4 +349,29 @@ def _checked_goals(goals: ArrayLike, states: int) -> Ints:
         )
     if (np.diff((given == NO_ACTION).astype(np.int8), axis=1) < 0).any() or (given[:, 0] == NO_ACTION).any():
         raise InvalidValue("goals: give each state at least one action, and -1 only after its last one.")
+    return given
+
+
+def _drawn_samples(samples: Any, limits: Array, seed: int) -> Array:
+    if isinstance(samples, bool) or not 2 <= samples <= MAX_STATES:
+        raise InvalidValue(
+            f"samples={samples!r}: give how many to draw, 2 to {MAX_STATES}, or an array of poses (S, {len(limits)}) in rad."
+        )
+    low, high = limits.T
+    return np.random.default_rng(seed).uniform(low, high, size=(samples, len(limits)))
+
+
+def _checked_within(samples: ArrayLike, limits: Array, joints: Sequence[str]) -> Array:
+    given = real_array("samples", samples)
+    if given.ndim != 2 or given.shape[1] != len(joints) or not 2 <= len(given) <= MAX_STATES:
+        raise InvalidValue(
+            f"samples have shape {given.shape}: give 2 to {MAX_STATES} poses of {', '.join(joints)}, shape (S, {len(joints)}), in rad."
+        )
+    outside = ~((given >= limits[:, 0]) & (given <= limits[:, 1]))
+    if outside.any():
+        sample, joint = np.argwhere(outside)[0]
+        low, high = limits[joint]
+        raise InvalidValue(f"sample {sample} has {joints[joint]} at {given[sample, joint]}: valid is {low:.4g} to {high:.4g} rad.")
+    if len(np.unique(given, axis=0)) < len(given):
+        raise InvalidValue("samples: two are the same pose, so one of them would have no cell; leave one out.")
     return given

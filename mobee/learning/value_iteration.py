@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Value iteration (thesis Algorithm 7), modified policy iteration, and policy iteration."""
+"""Models of the outcomes of actions, and values of actions by value iteration (thesis Algorithm 7) and by policy iteration.
+
+An outcome model gives the outcomes of each action and their probabilities. A learner's outcome model is called its beliefs.
+"""
 
 from __future__ import annotations
 
 import ctypes
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from functools import cache
@@ -21,6 +25,11 @@ if TYPE_CHECKING:
 
 METHODS = ("jacobi", "modified")
 BAD_REWARD = "reward holds NaN or +inf: valid are finite values, and -inf to exclude an action."
+LEAST_PROBABILITY = 1e-3  # surprise of an outcome that the agent held impossible: that of this probability
+PREDICTABLE_TRIES = 2
+PREDICTABLE_SHARE = 0.8
+"""A state-action is predictable if it was tried at least PREDICTABLE_TRIES (2) times, and this share of the tries had the same outcome."""
+_MARGIN = 1e-13  # of the largest value, by which a better action must be better
 
 
 class OutcomeModel(Protocol):
@@ -57,6 +66,19 @@ class Tabled(ABC):
     @abstractmethod
     def _tabled(self) -> TransitionTable:
         """Make the table; each subclass does so from its own arrays."""
+
+
+def probability_of(beliefs: OutcomeModel, s: int, a: int, outcome: int) -> float:
+    """Return the probability, in the model `beliefs`, that action `a` in state `s` ends in the state `outcome`.
+
+    It is 0 for a state that the model does not list as an outcome of the action.
+    """
+    return float(beliefs.probabilities[s, a][beliefs.outcomes[s, a] == outcome].sum())
+
+
+def surprise_of(probability: float) -> float:
+    """Return the surprise -ln p of an outcome of probability p, in nats; a p below LEAST_PROBABILITY (0.001) counts as this value."""
+    return -math.log(max(probability, LEAST_PROBABILITY))
 
 
 def value_iteration(
@@ -135,26 +157,6 @@ def tables(model: OutcomeModel, reward: Array, discount: float) -> tuple[Array, 
     return probabilities, outcomes, _checked_reward(reward, outcomes.shape[:2], discount)
 
 
-def _checked_reward(reward: Array, rows: tuple[int, ...], discount: float) -> Array:
-    if not 0.0 <= discount < 1.0:
-        raise InvalidValue(f"discount={discount!r}: valid is 0 <= discount < 1.")
-    reward = np.asarray(reward, np.float64, "C")
-    if reward.shape != rows:
-        raise InvalidValue(f"reward has shape {reward.shape}: give one value for each state and action, shape {rows}.")
-    return reward
-
-
-@cache
-def _core() -> tuple[ModuleType, Callable[[NDArray[Any]], int]]:
-    """Import the native functions when they are first needed, with the function that returns the address of an array."""
-    from mobee._core import address, learning
-
-    return learning, address
-
-
-_MARGIN = 1e-13  # of the largest value, by which a better action must be better
-
-
 def policy_iteration(model: OutcomeModel, reward: Array, discount: float = 0.9) -> tuple[Array, Array]:
     """Compute the values of states V (S,) and of actions Q (S, A) under the optimal policy, by policy iteration (Howard 1960).
 
@@ -193,3 +195,20 @@ def _evaluate(probabilities: Array, outcomes: Ints, rewards: Array, discount: fl
     immediate[acting] = rewards[acting, taken]
     values: Array = spsolve((eye_array(states) - onwards).tocsc(), immediate)
     return values
+
+
+def _checked_reward(reward: Array, rows: tuple[int, ...], discount: float) -> Array:
+    if not 0.0 <= discount < 1.0:
+        raise InvalidValue(f"discount={discount!r}: valid is 0 <= discount < 1.")
+    reward = np.asarray(reward, np.float64, "C")
+    if reward.shape != rows:
+        raise InvalidValue(f"reward has shape {reward.shape}: give one value for each state and action, shape {rows}.")
+    return reward
+
+
+@cache
+def _core() -> tuple[ModuleType, Callable[[NDArray[Any]], int]]:
+    """Import the native functions when they are first needed, with the function that returns the address of an array."""
+    from mobee._core import address, learning
+
+    return learning, address

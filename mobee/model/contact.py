@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from mobee._core.tables import NUMBERS, REALS, ROW_BYTES
+from mobee._core import NUMBERS, REALS, ROW_BYTES
 from mobee.arrays import Array
 from mobee.robot.robot import Robot
 

@@ -1,23 +1,145 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The compiled engine of one robot: holds the robot and the world in the compiled core (C++), for evaluations in any number of threads."""
+"""The compiled engine of one robot: evaluates poses in the compiled core (C++), in any number of threads, or one after the other.
+
+`Engine` holds the robot and the world in the core. `Track` evaluates a sequence of poses, fast if each is near the previous one: it uses
+a list of the near pairs of volumes (a neighbour list). In addition to q, an evaluation needs the world, as an immutable `Snapshot`, and
+the hands that reach (`Hands`).
+
+The hand of a marker is the marker's link with all links that it carries. While the marker reaches, contacts of the hand with targets are
+ignored. When the robot is at home, the marker may be inside a field (a volume that causes a repulsive force) of a link of the same part
+that is nearer to the base. Then contacts of the fields of that link with targets are ignored too; otherwise their forces would keep the
+marker away from every target.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from mobee._core import ROW_BYTES
 from mobee._core import engine as core
-from mobee._core.tables import ROW_BYTES
 from mobee.arrays import Array
 from mobee.errors import UnknownName
 from mobee.model.contact import ContactTable
-from mobee.model.robot_tables import Carried, robot_tables
-from mobee.model.snapshot import ATTACHED, NO_HANDS, Hands, Snapshot, hand_numbers
+from mobee.model.core_tables import Carried, robot_tables
 from mobee.robot.robot import Robot, per_robot
 
+if TYPE_CHECKING:
+    from mobee.model.model import Model, Reaching
+    from mobee.model.pose import Pose
+from functools import lru_cache
+from types import MappingProxyType
+
+from numpy.typing import NDArray
+
+from mobee.model.core_tables import VOLUME, Volumes, volume_row
+from mobee.model.world_object import Role, WorldObject
+
+OBSTACLE, TARGET, GHOST, ATTACHED, ATTACHED_GHOST = range(5)
+_FREE: dict[Role, int] = {"obstacle": OBSTACLE, "target": TARGET, "ghost": GHOST}
+_CARRIED: dict[Role, int] = {"obstacle": ATTACHED, "target": ATTACHED, "ghost": ATTACHED_GHOST}
+MAX_HANDS = 2  # hands that may reach at once; as `most_hands` in core/scene.hpp
+NO_HANDS: Hands = ()
 GRID_MIN_OBJECTS = 100  # with fewer objects a grid costs more than checking one after the other in vector instructions
 OBJECTS_PER_CELL = 8  # of the grid, on average
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Snapshot:
+    """An immutable state of the world; each edit of the world makes the next snapshot.
+
+    `version`: number of edits. `objects`: the objects by name, in the order in which they were added; `names`, `rows` and `roles` have the
+    same order. `rows` (N,): the volumes as rows of VOLUME (`mobee.model.core_tables`); those of attached objects are in the frame of their
+    link. `roles` (N,): OBSTACLE, TARGET or GHOST (an object that is only drawn); for an attached object ATTACHED, or ATTACHED_GHOST if it
+    is a ghost. `attached`: names of the attached objects.
+    """
+
+    version: int
+    objects: MappingProxyType[str, WorldObject]
+    names: tuple[str, ...]
+    rows: Volumes  # (N,) VOLUME, contiguous
+    roles: NDArray[np.int64]
+    attached: tuple[str, ...]
+
+
+EMPTY = Snapshot(0, MappingProxyType({}), (), np.empty(0, dtype=VOLUME), np.empty(0, dtype=np.int64), ())
+
+
+def extended(old: Snapshot, new: WorldObject) -> Snapshot:
+    """Return the next snapshot: `old` with one more object, `new`, at the end."""
+    count, role = len(old.names), _code(new)
+    rows, roles = np.empty(count + 1, dtype=VOLUME), np.empty(count + 1, dtype=np.int64)
+    rows[:count], rows[count] = old.rows, volume_row(new)
+    roles[:count], roles[count] = old.roles, role
+    attached = (*old.attached, new.name) if role >= ATTACHED else old.attached
+    return Snapshot(old.version + 1, _with(old, new), (*old.names, new.name), rows, roles, attached)
+
+
+def changed(old: Snapshot, new: WorldObject) -> Snapshot:
+    """Return the next snapshot: `old`, in which the object `new` replaces the object with the same name."""
+    place, role = old.names.index(new.name), _code(new)
+    rows, roles, attached = old.rows.copy(), old.roles, old.attached
+    rows[place] = volume_row(new)
+    if role != roles[place]:
+        roles = roles.copy()
+        roles[place] = role
+        attached = tuple(old.names[i] for i in np.flatnonzero(roles >= ATTACHED))
+    return Snapshot(old.version + 1, _with(old, new), old.names, rows, roles, attached)
+
+
+def shortened(old: Snapshot, name: str) -> Snapshot:
+    """Return the next snapshot: `old` without the object with the given name."""
+    place, count = old.names.index(name), len(old.names)
+    rows, roles = np.empty(count - 1, dtype=VOLUME), np.empty(count - 1, dtype=np.int64)
+    rows[:place], rows[place:] = old.rows[:place], old.rows[place + 1 :]
+    roles[:place], roles[place:] = old.roles[:place], old.roles[place + 1 :]
+    objects = old.objects.copy()
+    del objects[name]
+    names = old.names[:place] + old.names[place + 1 :]
+    attached = tuple(other for other in old.attached if other != name)
+    return Snapshot(old.version + 1, MappingProxyType(objects), names, rows, roles, attached)
+
+
+def _with(old: Snapshot, new: WorldObject) -> MappingProxyType[str, WorldObject]:
+    objects = old.objects.copy()
+    objects[new.name] = new
+    return MappingProxyType(objects)
+
+
+def _code(thing: WorldObject) -> int:
+    return (_FREE if thing.link is None else _CARRIED)[thing.role]
+
+
+@dataclass(frozen=True, slots=True)
+class Hand:
+    """The links of one reaching hand, whose contacts with targets are ignored.
+
+    `link`: index of a link; contacts of its solids and fields, and of those of all links that it carries, are ignored. `fields`: index of a
+    link; contacts of its fields only, and of the fields of all links that it carries, are ignored. `fields` is the same link as `link`, or
+    an earlier link of the part, nearer to the base. A solid is a volume of the body of a link; a field is a larger volume that causes a
+    repulsive force.
+    """
+
+    link: int
+    fields: int
+
+
+Hands = tuple[Hand, ...]
+
+
+@lru_cache(maxsize=64)
+def hand_numbers(reaching: Hands) -> tuple[int, ...]:
+    """Return four link indices for the compiled core: `link` and `fields` of the first hand, then of the second; -1: no hand.
+
+    The order is that of `Hands` in core/scene.hpp. Raises ValueError for more than two hands.
+    """
+    found = [number for hand in reaching for number in (hand.link, hand.fields)]
+    if len(found) > 2 * MAX_HANDS:
+        raise ValueError(f"{len(reaching)} hands reach at once; at most {MAX_HANDS} may")
+    return (*found, *[-1] * (2 * MAX_HANDS - len(found)))
 
 
 @per_robot
@@ -169,3 +291,69 @@ class Engine:
         new = core.robot(*robot_tables(self.robot, things).for_core())
         self._laden = key, new
         return new
+
+
+class Neighbours:
+    """Computes the contacts of a robot in consecutive poses, with a list of the pairs of volumes that are near each other.
+
+    An object is for one thread at a time. `skin`: m; pairs nearer than this are in the list. `cut`: True: a contact acts only on the motors
+    of the touching link's own part, as in the MoBeE program of 2014; False: also on the motors nearer to the base.
+    """
+
+    def __init__(self, engine: Engine, skin: float, cut: bool = False) -> None:
+        self._engine = engine
+        self._core = core.Following(skin, cut)
+        self._known: tuple[Scene, Hands] | None = None
+
+    def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands) -> tuple[ContactTable, Array]:
+        """Return all contacts in the consecutive poses q (B, n) rad, and their projection to the motors, (B, n) m^2/rad.
+
+        The projection is the sum of J^T (depth * normal) over the contacts of fields. Fields are volumes that cause repulsive forces; J is
+        the Jacobian of the contact's point. `snapshot`: the state of the world. `reaching`: the hands that reach for targets; their
+        contacts with targets are ignored.
+        """
+        self.enter(snapshot, reaching)
+        numbers, reals, torque = self._core.follow(q)
+        return self._engine.table(snapshot, numbers, reals), torque
+
+    def enter(self, snapshot: Snapshot, reaching: Hands) -> int:
+        """Set the world and the reaching hands for later computations; return the memory address of the core's object `Neighbours`.
+
+        If the world or the hands have changed, the list of near pairs is discarded; the core makes a new one when this saves time.
+        """
+        scene = self._engine.scene_of(snapshot)
+        known = self._known
+        if known is None or known[0] is not scene or known[1] != reaching:
+            self._core.enter(scene.handle, hand_numbers(reaching))
+            self._known = scene, reaching
+        return self._core.at
+
+
+class Track:
+    """Evaluates consecutive poses of one model: faster than `Model.evaluate` if each is near the previous one, with the same results.
+
+    The argument `skin` of `Model.track` is a distance: pairs of volumes that are farther apart are not checked until a volume has moved by
+    half this distance. A track takes little time to make and is for one thread at a time. For large steps between poses it is as fast as
+    `Model.evaluate`.
+    """
+
+    def __init__(self, model: Model, engine: object, skin: float) -> None:
+        """Make a track; users call `Model.track`.
+
+        `engine`: of the model; the engine of python-fcl has no list of near pairs and evaluates every pair. `skin`: m; pairs of volumes
+        nearer than this are in the list.
+        """
+        self._model = model
+        self._neighbours = Neighbours(engine, skin) if isinstance(engine, Engine) else None
+
+    def evaluate(self, q: ArrayLike, reaching: Reaching = None) -> Pose:
+        """Return the pose at q (n,) rad, or the poses along a path q (..., n) rad, evaluated in this order.
+
+        `reaching`: name of the marker that reaches for the targets, or names of up to two; None: none. The compiled engine computes the
+        contacts at once, not when they are read. Raises InvalidValue if q has another shape or is not finite, and UnknownName if the robot
+        does not have the marker.
+        """
+        pose = self._model.evaluate(q, reaching=reaching)
+        if self._neighbours is not None:
+            pose.compute_contacts(self._neighbours)
+        return pose

@@ -15,10 +15,9 @@ import numpy as np
 from mobee.arrays import Array, Ints
 from mobee.errors import NotInstalled, UnknownName
 from mobee.model.contact import ContactTable
-from mobee.model.kinematics import link_transforms, point_jacobian
-from mobee.model.levers import push_factors
-from mobee.model.snapshot import ATTACHED, NO_HANDS, OBSTACLE, TARGET, Hands, Snapshot
-from mobee.model.volumes import bound
+from mobee.model.core_tables import bound
+from mobee.model.engine import ATTACHED, NO_HANDS, OBSTACLE, TARGET, Hands, Snapshot
+from mobee.model.kinematics import link_transforms, point_jacobian, push_factors
 from mobee.model.world_object import WorldObject
 from mobee.robot.robot import Robot, Shape
 
@@ -59,7 +58,7 @@ class FclEngine:
         """Return all contacts in the poses q (B, n) rad, and their projection to the motors, (B, n) m^2/rad.
 
         The projection is the sum of J^T (factor * depth * normal) over the contacts of fields (volumes that cause repulsive forces). J is
-        the Jacobian of the contact's point; the factors (1 if `robot.least_lever` is 0) are those of `mobee.model.levers.push_factors`.
+        the Jacobian of the contact's point; the factors (1 if `robot.least_lever` is 0) are those of `mobee.model.kinematics.push_factors`.
         `snapshot`: the state of the world. `reaching`: the hands that reach for targets; their contacts with targets are ignored. `cut`:
         True: a contact acts only on the motors of the touching link's own part, as in the MoBeE program of 2014; False: also on the motors
         nearer to the base. `threads`: not used; the poses are computed one after the other.

@@ -5,22 +5,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mobee.arrays import Array, checked_threads, real_array
 from mobee.errors import InvalidValue, UnknownName
+from mobee.model.engine import EMPTY, MAX_HANDS, NO_HANDS, Hand, Hands, Track
+from mobee.model.engine import Engine as NativeEngine
 from mobee.model.pose import Engine, Pose
-from mobee.model.snapshot import EMPTY, MAX_HANDS, NO_HANDS, Hand, Hands
 from mobee.model.world import World, link_pose
 from mobee.model.world_object import seen_from, sphere
 from mobee.robot.robot import Robot
-
-if TYPE_CHECKING:
-    from mobee.model.engine import Engine as NativeEngine
-    from mobee.model.track import Track
 
 _FLOAT = np.dtype(np.float64)
 
@@ -124,8 +121,6 @@ class Model:
         """
         if not 0.0 < skin < math.inf:
             raise InvalidValue(f"skin {skin} m: must be a finite distance above 0")
-        from mobee.model.track import Track
-
         return Track(self, self._engine, skin)
 
     def jacobian(self, q: ArrayLike, marker: str) -> Array:
@@ -186,6 +181,4 @@ def _engine(robot: Robot, name: str) -> Engine:
 
 def engine_of(robot: Robot) -> NativeEngine:
     """Return a new compiled engine for a robot; the first call in a process loads the compiled core."""
-    from mobee.model.engine import Engine
-
-    return Engine(robot)
+    return NativeEngine(robot)

@@ -11,15 +11,15 @@ import numpy as np
 from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
 from mobee.model.contact import Contact, ContactTable
+from mobee.model.engine import Hands, Snapshot
 from mobee.model.kinematics import point_jacobian
-from mobee.model.snapshot import Hands, Snapshot
 from mobee.model.world import link_pose
 from mobee.model.world_object import WorldObject, placed
 from mobee.robot.robot import Robot
 
 
 class Finder(Protocol):
-    """An object that computes the contacts of poses, for example an `Engine` or `mobee.model.track.Neighbours`."""
+    """An object that computes the contacts of poses, for example an `Engine` or `mobee.model.engine.Neighbours`."""
 
     def contacts(self, q: Array, snapshot: Snapshot, reaching: Hands) -> tuple[ContactTable, Array]:
         """Return all contacts in the poses q (B, n) rad, and their projection to the motors, (B, n) m^2/rad.
@@ -148,7 +148,8 @@ class Pose:
 
         The sum is over the contacts of fields. Fields are volumes that cause repulsive forces; J is the Jacobian of the contact's point. In
         a contact of two links, the push acts on the first link, and the opposite push on the second. A push acts on all motors from its
-        link down to the base. If `robot.least_lever` is above 0, each push is multiplied by a factor (`mobee.model.levers.push_factors`).
+        link down to the base. If `robot.least_lever` is above 0, each push is multiplied by a factor
+        (`mobee.model.kinematics.push_factors`).
         """
         evaluated = self._evaluated
         if evaluated is None:

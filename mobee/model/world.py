@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from mobee.arrays import Array
 from mobee.errors import InvalidValue, UnknownName
-from mobee.model.snapshot import EMPTY, Snapshot, changed, extended, shortened
+from mobee.model.engine import EMPTY, Snapshot, changed, extended, shortened
 from mobee.model.world_object import (
     FRICTION,
     Color,

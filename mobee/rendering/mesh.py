@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from mobee.arrays import Array, Ints
 from mobee.errors import NotInstalled, RobotFileError
 from mobee.robot.mjcf.compiled import meshes_of
+from mobee.robot.robot import Channels, MeshSource
 from mobee.robot.urdf.mesh import LARGEST, first_file, mesh_places, searched
-from mobee.robot.visual import Channels, MeshSource
 
 CREASE = 0.6  # cosine: an edge whose faces differ by more is drawn as an edge, not rounded
 FORMATS = (".stl", ".obj", ".dae", ".ply", ".glb", ".gltf", ".off")

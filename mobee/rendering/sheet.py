@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sheets of pictures as PNG files: filmstrips of motions, and the positions of markers in many poses (as thesis figs. 3.1, 3.2).
+"""Motions of a robot, and sheets of pictures of them as PNG files: filmstrips, and positions of markers (as thesis figs. 3.1, 3.2).
 
-Pictures of a plant's motion: `with recorded(plant) as recording: plant.act(...)`, then
-`filmstrip([Strip(recording.motion(), "right_palm")], path)`.
+A motion is a sequence of poses, with the world's objects at each pose. Pictures of a plant's motion:
+`with recorded(plant) as recording: plant.act(...)`, then `filmstrip([Strip(recording.motion(), "right_palm")], path)`.
 Pictures of poses (T, n) rad, such as a path of a roadmap: `Strip(motion_through(model, q), "right_palm", views=("oblique", "top"))`.
 """
 
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path
@@ -18,17 +19,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mobee.arrays import Array
+from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue, NotInstalled
 from mobee.model.model import Model
 from mobee.model.pose import Pose
+from mobee.model.world_object import WorldObject
 from mobee.rendering.camera import camera_axes, framing
-from mobee.rendering.link_solids import robot_solids
-from mobee.rendering.motion import Motion
 from mobee.rendering.picture import Picture, draw
-from mobee.rendering.solid import Color, Solid, ball, focus, lowest, object_solids, trail_solids
+from mobee.rendering.solid import Color, Solid, ball, focus, lowest, object_solids, robot_solids, trail_solids
+from mobee.simulation.plant import OfflinePlant
 
 View = str | tuple[float, float]
+
+MOVED = 0.02  # rad, or m: a motor that moves less counts as still
+REST_SPEED = 0.002  # m/s: a pause counts as motion at this speed, so that it gets few of the moments shown
 
 DPI = 100
 GAP, MARGIN = 8, 10  # pixels
@@ -37,6 +41,100 @@ POINT_RADIUS = 0.0045  # m
 LOWEST, MIDDLE, HIGHEST = np.array([0.16, 0.42, 0.92]), np.array([0.20, 0.78, 0.58]), np.array([1.00, 0.70, 0.12])  # colours of values
 POINT_VEIL = 0.2
 POINT_GROUP = -3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """A sequence of T poses.
+
+    `poses`: the T poses, at `times` (T,) s. `objects`: for each pose, the objects of the world by name.
+    """
+
+    poses: tuple[Pose, ...]
+    times: Array
+    objects: tuple[Mapping[str, WorldObject], ...]
+
+    def __post_init__(self) -> None:
+        """Check that there are as many times and objects as poses, and at least one; raise InvalidValue otherwise."""
+        if not len(self.poses) == len(self.times) == len(self.objects) > 0:
+            counts = f"{len(self.poses)} poses, {len(self.times)} times, {len(self.objects)} worlds"
+            raise InvalidValue(f"a motion of {counts}: must be as many of each, at least one")
+
+    def __len__(self) -> int:
+        return len(self.poses)
+
+    def part(self, first: int, last: int) -> Motion:
+        """Return the motion from the pose with index `first` to the pose with index `last`, both included."""
+        return Motion(self.poses[first : last + 1], self.times[first : last + 1], self.objects[first : last + 1])
+
+    def path(self, marker: str) -> Array:
+        """Return the positions of a marker in all poses, (T, 3) m, root frame; raise UnknownName if the robot has no such marker."""
+        return np.array([pose.position(marker) for pose in self.poses])
+
+    def moved(self) -> tuple[str, ...]:
+        """Return the names of the parts of which at least one motor moves by more than 0.02 (rad or m)."""
+        q = np.array([pose.q for pose in self.poses])
+        moves = np.ptp(q, axis=0) > MOVED
+        return tuple(name for name, part in self.poses[0].robot.parts.items() if moves[part.slice].any())
+
+    def moments(self, marker: str, count: int) -> Ints:
+        """Return the indices of up to `count` poses, from the first to the last, between which the marker moves about equal distances.
+
+        They are the poses to draw in a filmstrip.
+        """
+        steps = np.linalg.norm(np.diff(self.path(marker), axis=0), axis=1) + REST_SPEED * np.diff(self.times)
+        covered = np.concatenate([[0.0], np.cumsum(steps)])
+        shares = np.linspace(0.0, covered[-1], count) if count > 1 else covered[-1:]
+        return np.unique(np.abs(covered - shares[:, None]).argmin(axis=1))
+
+
+def motion_through(model: Model, q: ArrayLike, times: Sequence[float] | None = None) -> Motion:
+    """Return the motion through poses q (T, n) rad in the model's present world; attached objects move with their links.
+
+    `times`: (T,) s; None: 0, 1, 2, ...
+    """
+    poses = tuple(model.evaluate(row) for row in np.atleast_2d(np.asarray(q, dtype=np.float64)))
+    found = np.arange(len(poses), dtype=np.float64) if times is None else np.asarray(times, dtype=np.float64)
+    return Motion(poses, found, tuple(pose.objects for pose in poses))
+
+
+class Recording:
+    """Keeps poses of an offline plant (a simulated robot): the pose when the recording is made, and the pose at each call of `add`."""
+
+    def __init__(self, plant: OfflinePlant) -> None:
+        self._plant = plant
+        self._poses: list[Pose] = []
+        self._times: list[float] = []
+        self._objects: list[dict[str, WorldObject]] = []
+        self.add(plant.time)
+
+    def __len__(self) -> int:
+        return len(self._poses)
+
+    def add(self, time: float) -> None:
+        """Add the plant's present pose at `time` [s]; nothing is added before the plant's first tick."""
+        if (pose := self._plant.pose) is not None:
+            self._poses.append(pose)
+            self._times.append(time)
+            self._objects.append(pose.objects)
+
+    def motion(self) -> Motion:
+        """Return the motion recorded so far, with times from 0; raise InvalidValue if no pose was recorded."""
+        return Motion(tuple(self._poses), np.array(self._times) - self._times[:1], tuple(self._objects))
+
+
+@contextmanager
+def recorded(plant: OfflinePlant, step: float = 0.05) -> Iterator[Recording]:
+    """Record an offline plant inside the `with` block, one pose every `step` seconds of simulated time.
+
+    The recording replaces the callback that was set with `plant.every`; afterwards no callback is set.
+    """
+    recording = Recording(plant)
+    plant.every(max(1, round(step / plant.dt)), recording.add)
+    try:
+        yield recording
+    finally:
+        plant.every(1, None)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from mobee.arrays import Array, Ints, checked_threads
 from mobee.errors import InvalidValue
+from mobee.model.core_tables import bound
+from mobee.model.engine import Snapshot
 from mobee.model.model import Model, Reaching, engine_of
-from mobee.model.snapshot import Snapshot
-from mobee.model.volumes import bound
 from mobee.model.world_object import WorldObject
 from mobee.roadmap.ik.costs import lengths
 from mobee.roadmap.ik.problem import solid_model
@@ -125,8 +125,8 @@ def points(model: Model, q: Array, marker: str | None = None) -> Array:
 
 
 def _sweep(model: Model, q: Array, edges: Ints, poses: Ints, threads: int, reaching: Reaching) -> tuple[Flags, int]:
-    from mobee._core.edges import sweep  # loads the core, so it is imported only when needed
-    from mobee.model.track import Neighbours
+    from mobee._core.roadmap import sweep  # loads the core, so it is imported only when needed
+    from mobee.model.engine import Neighbours
 
     users = [Neighbours(engine_of(model.robot), SKIN) for _ in range(threads)]
     snapshot, hands = model.world.snapshot, model.hands(reaching)

@@ -10,8 +10,7 @@ import numpy as np
 
 from mobee.arrays import Array
 from mobee.errors import InvalidValue, UnknownName
-from mobee.robot.robot import Robot
-from mobee.robot.visual import Camera
+from mobee.robot.robot import Camera, Robot
 
 EYES = {"left": "left_eye", "right": "right_eye"}  # cameras, and the markers that make them
 OWN = 2  # cameras of a file that make pictures unless more are named

@@ -14,8 +14,7 @@ from mobee.arrays import Array
 from mobee.errors import InvalidValue, UnknownName
 from mobee.robot.bodies import one_a_link
 from mobee.robot.pairs import joined_pairs, joined_untested
-from mobee.robot.robot import Body, Clause, Joint, Marker, Motor, Part, Robot, Shape
-from mobee.robot.visual import Camera, Visual
+from mobee.robot.robot import Body, Camera, Clause, Joint, Marker, Motor, Part, Robot, Shape, Visual
 
 SEPARATOR = "_"  # part names are in keys of the bus: a-z, 0-9 and _ only
 

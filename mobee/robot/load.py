@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mobee.errors import InvalidValue, RobotFileError, UnknownName
-from mobee.robot.mjcf.compiled import is_mjcf
-from mobee.robot.mjcf.menagerie import menagerie_file, menagerie_names
+from mobee.robot.mjcf.compiled import is_mjcf, menagerie_file, menagerie_names
 from mobee.robot.robot import Robot
 from mobee.robot.xml.file import is_file
 from mobee.robot.xml.read import read_robot
@@ -52,7 +51,7 @@ def load_robot(
     path = find_file(name_or_path, ROBOTS, "robot")
     is_urdf = path.suffix.lower() == ".urdf"
     if is_urdf or is_mjcf(path):
-        from mobee.robot.mjcf.read import read_mjcf  # fourteen modules, and no shipped robot needs them
+        from mobee.robot.mjcf.read import read_mjcf  # twelve modules, and no shipped robot needs them
         from mobee.robot.urdf.hull import CORNERS
         from mobee.robot.urdf.read import UrdfOptions, read_urdf
 

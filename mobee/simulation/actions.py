@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from mobee._core import Table
 from mobee._core.plant import PART
-from mobee._core.tables import Table
 from mobee.arrays import Array, real_array
 from mobee.control.gains import VERDICTS
 from mobee.errors import InvalidValue

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs many offline plants (simulated robots) at once: in one call of the compiled core, or in one process for each processor core."""
+"""Runs many offline plants (simulated robots) at once: in one call of the compiled core, or in one process for each processor core.
+
+The states of the plants of a `PlantBatch`, which have one model, are rows of arrays.
+"""
 
 from __future__ import annotations
 
@@ -13,11 +16,13 @@ from typing import TypeVar
 
 import numpy as np
 
+from mobee._core import address
 from mobee._core import plant as core
-from mobee.arrays import checked_threads
-from mobee.errors import BatchInterrupted, InvalidValue
+from mobee.arrays import Array, Ints, checked_threads
+from mobee.errors import ActionInterrupted, BatchInterrupted, InvalidValue
+from mobee.model.model import Model
 from mobee.plant import Outcome
-from mobee.simulation.plant import OfflinePlant
+from mobee.simulation.plant import OfflinePlant, PlantSettings
 from mobee.simulation.runner import Trace, Work
 
 T = TypeVar("T")
@@ -62,6 +67,95 @@ def run_together(plants: Iterable[OfflinePlant], ticks: int, threads: int = 1) -
     if isinstance(ticks, bool) or not isinstance(ticks, int) or ticks < 0:
         raise InvalidValue(f"ticks={ticks!r}: give a whole number, 0 or more.")
     return _finished([plant.running(ticks) for plant in listed], checked_threads(threads))
+
+
+def run_batch(work: Callable[[int], T], seeds: Iterable[int], processes: int | None = None) -> list[T]:
+    """Call `work(seed)` for every seed in several processes; return the results in the order of the seeds.
+
+    `work`: a function defined at the top level of a module, so that processes can import it; it makes a plant with the seed, uses it, and
+    returns an object that can be pickled. `processes`: number of processes; None: one for each processor core; 1: in this process.
+    Exceptions of `work` are raised here.
+    """
+    if processes is not None and (isinstance(processes, bool) or not isinstance(processes, int) or processes < 1):
+        raise InvalidValue(f"processes={processes!r}: give a whole number from 1 on, or None for one per core.")
+    given = list(seeds)
+    count = min(processes or _cores(), len(given))
+    if count <= 1:
+        return [work(seed) for seed in given]
+    with ProcessPoolExecutor(count, mp_context=get_context("spawn")) as pool:  # a fork could copy locks that are held by threads
+        return list(pool.map(work, given))
+
+
+class PlantBatch:
+    """Several offline plants (simulated robots) of one model; the results of each are bit-equal to those of a separate `OfflinePlant`.
+
+    In all methods, `which` (k,) are indices of `plants`, each at most once.
+
+    Args:
+        model: the robot in its world.
+        count: number of plants.
+        settings: settings of all plants; None: the defaults of `PlantSettings`.
+        threads: number of threads of the simulation.
+    """
+
+    def __init__(self, model: Model, count: int, settings: PlantSettings | None = None, threads: int = 1) -> None:
+        self.plants = [OfflinePlant(model, settings=settings) for _ in range(count)]
+        """The plants; each may be used separately between two calls."""
+        self._model, self._threads, self._core = model, checked_threads(threads), core.calls()
+        self._addresses: Ints = np.array([plant.address for plant in self.plants], dtype=np.int64)
+        self._deepest = np.zeros((count, core.RECORD_DEPTHS))
+
+    def state(self) -> Array:
+        """Return encoders [rad], attractors [rad] and velocities [rad/s] of all plants, in this order, (count, 3, n).
+
+        An attractor is the position to which the controller moves a motor. The velocities are those of the control law's own state, which
+        are not measured.
+        """
+        state = np.empty((len(self.plants), 3, len(self._model.robot.motors)))
+        self._core.read_many(self._addresses.tobytes(), len(self.plants), address(state))
+        return state
+
+    def aim(self, which: Ints, attractors: Array) -> None:
+        """Set the attractors of the plants `which` (k,) to `attractors` (k, n) rad, positions to which the controllers move the motors.
+
+        No action begins, and the limits of the motors are not checked.
+        """
+        self._core.aim_many(self._addresses[which].tobytes(), len(which), np.ascontiguousarray(attractors).tobytes())
+
+    def run(self, which: Ints, ticks: int) -> Array:
+        """Run exactly `ticks` ticks of each of the plants `which` (k,); return the depths of their deepest contacts.
+
+        The end of an action does not stop the run. The result is (k, 2) m, of contacts of solids and of fields (volumes that cause
+        repulsive forces) during these ticks; 0 without contacts. Raises BatchInterrupted if a plant's state is not finite; the attribute
+        `results` of the exception then holds the rows of the other plants.
+        """
+        chosen = [self.plants[number] for number in which.tolist()]
+        if not all([plant.prepare_batch(self._deepest[number]) for number, plant in zip(which.tolist(), chosen, strict=True)]):
+            return _run_traced(chosen, ticks, self._threads)
+        self._deepest[which] = 0.0
+        self._core.run_for(self._addresses[which].tobytes(), len(which), ticks, self._threads)
+        deepest, lost = self._deepest[which], dict[int, ActionInterrupted]()
+        for row, plant in enumerate(chosen):
+            try:
+                plant.conclude()
+            except ActionInterrupted as error:
+                lost[row] = error
+        if lost:
+            raise BatchInterrupted([lost.get(row, depths) for row, depths in enumerate(deepest)]) from lost[min(lost)]
+        return deepest
+
+
+def _run_traced(plants: Sequence[OfflinePlant], ticks: int, threads: int) -> Array:
+    """Do what `PlantBatch.run` does, for plants some of which need Python in their ticks."""
+    try:
+        return np.array([_deepest(trace) for trace in run_together(plants, ticks, threads)])
+    except BatchInterrupted as error:
+        results = [_deepest(one) if isinstance(one, Trace) else one for one in error.results]
+        raise BatchInterrupted(results) from error.__cause__
+
+
+def _deepest(trace: Trace) -> Array:
+    return np.array([trace.solid.max(initial=0.0), trace.field.max(initial=0.0)])
 
 
 def _apart(plants: Iterable[OfflinePlant]) -> list[OfflinePlant]:
@@ -113,23 +207,6 @@ def _run_all(waiting: dict[int, Work[T]], results: dict[int, T], lost: dict[int,
                 lost[number] = error
         run(np.array([*ready.values()], dtype=np.int64).tobytes(), len(ready), threads)
         waiting = {number: waiting[number] for number in ready}
-
-
-def run_batch(work: Callable[[int], T], seeds: Iterable[int], processes: int | None = None) -> list[T]:
-    """Call `work(seed)` for every seed in several processes; return the results in the order of the seeds.
-
-    `work`: a function defined at the top level of a module, so that processes can import it; it makes a plant with the seed, uses it, and
-    returns an object that can be pickled. `processes`: number of processes; None: one for each processor core; 1: in this process.
-    Exceptions of `work` are raised here.
-    """
-    if processes is not None and (isinstance(processes, bool) or not isinstance(processes, int) or processes < 1):
-        raise InvalidValue(f"processes={processes!r}: give a whole number from 1 on, or None for one per core.")
-    given = list(seeds)
-    count = min(processes or _cores(), len(given))
-    if count <= 1:
-        return [work(seed) for seed in given]
-    with ProcessPoolExecutor(count, mp_context=get_context("spawn")) as pool:  # a fork could copy locks that are held by threads
-        return list(pool.map(work, given))
 
 
 def _cores() -> int:

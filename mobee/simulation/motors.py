@@ -11,9 +11,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from mobee._core import address
+from mobee._core import Table, address, numbers, view
 from mobee._core import plant as core
-from mobee._core.tables import Table, numbers, view
 from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
 from mobee.model.masses import gravity_torque

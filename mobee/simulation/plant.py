@@ -13,9 +13,8 @@ from numpy.typing import ArrayLike
 
 from mobee.arrays import Array, real_array
 from mobee.control import Controller, Gains
-from mobee.control.forces import Propagate
+from mobee.control.forces import Propagate, Term
 from mobee.control.law import Modality
-from mobee.control.terms import Term
 from mobee.errors import ActionInterrupted, InvalidValue
 from mobee.model.contact import links_moved, touched_in
 from mobee.model.model import engine_of

@@ -11,16 +11,14 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from mobee._core import address
+from mobee._core import Table, View, address, view
 from mobee._core import plant as core
 from mobee._core.law import term_names
-from mobee._core.tables import Table, View, view
 from mobee.arrays import Array
 from mobee.control import Controller
+from mobee.model.engine import Hand, Hands, Neighbours, Snapshot
 from mobee.model.masses import gravity_torque
 from mobee.model.model import engine_of
-from mobee.model.snapshot import Hand, Hands, Snapshot
-from mobee.model.track import Neighbours
 from mobee.simulation.motors import Motors
 from mobee.simulation.rigid import stiffened
 

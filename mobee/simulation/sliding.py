@@ -11,8 +11,8 @@ import numpy as np
 
 from mobee.arrays import Array
 from mobee.errors import InvalidValue, UnknownName
+from mobee.model.engine import NO_HANDS
 from mobee.model.model import engine_of
-from mobee.model.snapshot import NO_HANDS
 from mobee.model.world import World
 from mobee.model.world_object import Geometry, WorldObject, cylinder
 from mobee.robot.robot import Robot, per_robot

@@ -14,7 +14,7 @@ from mobee.rendering.camera import Camera as View
 from mobee.rendering.camera import Floats
 from mobee.rendering.scene import Picture, Pixels, Scene
 from mobee.vision.imperfections import CameraErrors, CameraSettings
-from mobee.vision.mount import camera_frames
+from mobee.vision.lens import camera_frames
 
 NOISE_TABLE = 4_000_003  # numbers, at least those of the largest picture
 MARGIN = 2  # px around the part of the plane that the lens shows

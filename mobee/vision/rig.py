@@ -10,11 +10,9 @@ import numpy as np
 
 from mobee.arrays import Array
 from mobee.model.kinematics import link_transforms, point_jacobian
-from mobee.robot.robot import Robot
-from mobee.robot.visual import Camera
+from mobee.robot.robot import Camera, Robot
 from mobee.vision.imperfections import HEAD, CameraErrors
-from mobee.vision.lens import Lens
-from mobee.vision.mount import camera_frames, into, mounted, right_slope, rotation_of, skew_of
+from mobee.vision.lens import Lens, camera_frames, into, mounted, right_slope, rotation_of, skew_of
 from mobee.vision.tag import Tag
 
 AXES = ("x", "y", "z", "turn_x", "turn_y", "turn_z")  # of a mount

@@ -11,7 +11,7 @@ import numpy as np
 from mobee.arrays import Array
 from mobee.model.kinematics import link_transforms
 from mobee.vision.encoders import Moment
-from mobee.vision.mount import camera_frames
+from mobee.vision.lens import camera_frames
 from mobee.vision.rig import Rig, see_points
 
 STEPS, ENOUGH = 8, 1e-7  # of Gauss and Newton, m

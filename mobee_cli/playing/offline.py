@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from experiments.kit.command_line import Progress
-from mobee.control.stability import largest_step
+from mobee.control.law import largest_step
 from mobee.learning.agent import CuriousAgent, run
 from mobee.model.model import Model
 from mobee.robot.robot import Robot

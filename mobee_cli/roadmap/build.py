@@ -13,7 +13,7 @@ from typing import Any
 
 from experiments.kit.command_line import Progress
 from mobee import Model
-from mobee.roadmap.ik.ngik import METHODS
+from mobee.roadmap.ik.solve import METHODS
 from mobee_cli.errors import UserError
 from mobee_cli.robot_options import add_robot, add_world, given_options, robot_given, world_given
 from services.common.exit_codes import BAD_INPUT, INTERRUPTED

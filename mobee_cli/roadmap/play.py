@@ -171,8 +171,7 @@ def _lines(trm: Roadmap, found: dict[str, Any]) -> list[str]:
 
 
 def _filmstrip(trm: Roadmap, played: Played, path: Path) -> Path:
-    from mobee.rendering.motion import motion_through
-    from mobee.rendering.sheet import Strip, filmstrip
+    from mobee.rendering.sheet import Strip, filmstrip, motion_through
 
     if path.suffix.lower() != ".png" or not path.resolve().parent.is_dir():
         raise UserError(f"--picture {path}: give a name that ends in .png, in an existing folder", BAD_INPUT)

@@ -13,10 +13,9 @@ from msgspec import Meta
 
 from mobee.errors import InvalidValue
 from mobee.learning.explorers import EXPLORERS
-from mobee.learning.grid import Grid
 from mobee.learning.lattice import Lattice
 from mobee.learning.learner import CuriousSettings
-from mobee.learning.object_space import ObjectSpace
+from mobee.learning.object_space import Grid, ObjectSpace
 from mobee.learning.reaching.learner import ReachSettings
 from mobee.learning.reaching.predictors import PREDICTORS
 from mobee.learning.reaching.strategies import STRATEGIES

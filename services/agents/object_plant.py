@@ -14,8 +14,7 @@ from bus_schema import keys
 from bus_schema.rpc import Done, ObjectState, Place
 from mobee.arrays import Array
 from mobee.errors import MobeeError
-from mobee.learning.grid import MARGIN
-from mobee.learning.object_space import ObjectSpace
+from mobee.learning.object_space import MARGIN, ObjectSpace
 from mobee.plant import Outcome, PerceivingPlant
 from services.agents.config import Config
 from services.common.bus_plant import BusPlant

@@ -13,12 +13,11 @@ from bus_schema.messages import Decision, Learned, Surprise
 from bus_schema.messages import Transition as TransitionMessage
 from mobee import CuriousAgent, ReachTarget, TransitionModel
 from mobee.arrays import Array
-from mobee.learning.beliefs import probability_of
-from mobee.learning.reaching.planning import REACH
 from mobee.learning.reaching.reach_agent import ReachAgent
-from mobee.learning.reaching.tries import Step
+from mobee.learning.reaching.reaches import REACH
+from mobee.learning.reaching.store import Step
 from mobee.learning.space import Space
-from mobee.learning.value_iteration import OutcomeModel
+from mobee.learning.value_iteration import OutcomeModel, probability_of
 from mobee.store import Transition
 from services.common.bus import Bus, Publisher
 

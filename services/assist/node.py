@@ -9,7 +9,7 @@ import numpy as np
 
 from mobee.arrays import Array
 from mobee.behaviours.gaze import LAG
-from mobee.behaviours.reference import Reference
+from mobee.behaviours.tracking import Reference
 from mobee.robot.robot import Robot
 from services.assist.config import Config
 from services.common.behaviour import Behaviour, Scene

@@ -13,7 +13,7 @@ from msgspec import Meta
 
 from bus_schema.messages import Tick, WorldObject
 from mobee.arrays import Array
-from mobee.behaviours.target import TargetTrack
+from mobee.behaviours.tracking import TargetTrack
 from mobee.control.gains import Gains
 from mobee.errors import InvalidValue
 from mobee.model.kinematics import link_transforms

@@ -9,8 +9,7 @@ from mobee.arrays import Array
 from mobee.errors import InvalidValue
 from mobee.model.kinematics import link_transforms
 from mobee.robot.cameras import EYES, camera_frame, cameras_of
-from mobee.robot.robot import Robot
-from mobee.robot.visual import Camera
+from mobee.robot.robot import Camera, Robot
 from services.common.config import ServiceConfig
 
 STEREO = 2  # cameras that locate a ball

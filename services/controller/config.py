@@ -27,7 +27,7 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     """Milliseconds without a command after which robot_sim holds a part."""
     terms: list[str] = []
     """User-defined forces of the control law. Each is `module:name`, where the name in the importable module is a
-    `mobee.control.terms.Term` or a function that returns the force. The model needs the same setting."""
+    `mobee.control.forces.Term` or a function that returns the force. The model needs the same setting."""
     posture: dict[str, list[float]] = {}
     """Posture of each part while it has no owner, rad, by name of the part; a part that is not named stays where it is."""
 

@@ -14,12 +14,11 @@ from bus_schema.messages import ContactItem
 from bus_schema.messages import Forces as ForcesMessage
 from mobee.arrays import Array
 from mobee.control import Forces
-from mobee.control.forces import LARGEST_FORCE, published_terms
-from mobee.control.terms import Term, valid_terms
+from mobee.control.forces import LARGEST_FORCE, Term, published_terms, valid_terms
 from mobee.model.contact import KINDS, ContactTable
-from mobee.model.levers import push_factors
+from mobee.model.engine import Hands, Snapshot
+from mobee.model.kinematics import push_factors
 from mobee.model.pose import Pose
-from mobee.model.snapshot import Hands, Snapshot
 from mobee.robot.robot import Robot
 from mobee.settings import imported
 
@@ -118,7 +117,7 @@ class PublishedContacts:
 
         A field is a volume around a link, larger than the link; its contacts cause repulsive forces. The projection is the sum of
         J^T (factor * depth * normal) over these contacts; the factors (1 if `robot.least_lever` is 0) are those of
-        `mobee.model.levers.push_factors`. `snapshot` (the world) and `reaching` (the hands that reach) are not used, because the model
+        `mobee.model.kinematics.push_factors`. `snapshot` (the world) and `reaching` (the hands that reach) are not used, because the model
         service has already used its own when it computed the contacts.
         """
         projection, numbers, reals = np.zeros_like(q), list[tuple[int, ...]](), list[list[float]]()

@@ -13,7 +13,7 @@ from bus_schema.messages import ReachPhase, Targets, Tick
 from bus_schema.rpc import ReachFor
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
-from mobee.model.snapshot import MAX_HANDS
+from mobee.model.engine import MAX_HANDS
 from mobee.reach import ReachTarget
 from mobee.robot.robot import Robot
 from services.common.bus import Bus

@@ -9,7 +9,7 @@ import numpy as np
 from msgspec import Meta
 
 from mobee.arrays import Array
-from mobee.behaviours.hand import Hand
+from mobee.behaviours.grasp import Hand
 from mobee.errors import InvalidValue, UnknownName
 from mobee.model.world_object import WorldObject
 from mobee.robot.robot import Robot

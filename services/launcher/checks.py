@@ -152,7 +152,7 @@ def check_rate(scenario: Scenario, robots: Mapping[str, Robot]) -> None:
     `robots`: the robots by name or path, as returned by `check_robots`.
     """
     from mobee.control.gains import Gains
-    from mobee.control.stability import require_stable
+    from mobee.control.law import require_stable
 
     configs = {part.entry.module: part.config for part in scenario.parts}
     controller = configs.get("services.controller")

@@ -20,9 +20,9 @@ from mobee.control import constraint_forces
 from mobee.control.forces import needs_contacts, published_terms
 from mobee.errors import MobeeError
 from mobee.model.contact import KINDS, Contact, touched
+from mobee.model.engine import MAX_HANDS
 from mobee.model.kinematics import quaternion_from_matrix
 from mobee.model.pose import Pose as ModelPose
-from mobee.model.snapshot import MAX_HANDS
 from mobee.robot.cameras import cameras_of
 from mobee.robot.robot import Robot
 from mobee.vision.calibration.calibration import load_calibration

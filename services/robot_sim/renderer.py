@@ -21,8 +21,7 @@ import numpy as np
 from bus_schema.messages import Camera, Clock, Image, Truth
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
-from mobee.rendering.room import clutter, room
-from mobee.rendering.scene import Picture, Scene
+from mobee.rendering.scene import Picture, Scene, clutter, room
 from mobee.rendering.solid import Solid
 from mobee.robot.cameras import cameras_of
 from mobee.robot.robot import Robot

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from experiments.kit.cells import Cell, write_cell
-from mobee.learning.reaching.planning import REACH
-from mobee.learning.reaching.store import ReachStore
-from mobee.learning.reaching.tries import Step
+from mobee.learning.reaching.reaches import REACH
+from mobee.learning.reaching.store import ReachStore, Step
 from mobee.reach import ReachTarget
 from mobee.store import STORE, Transition, TransitionStore
 from mobee_cli.__main__ import main

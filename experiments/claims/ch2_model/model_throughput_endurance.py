@@ -23,9 +23,9 @@ from experiments.kit.plots import new_figure
 from experiments.kit.records import Records
 from mobee import InvalidValue, Model, World, load_robot
 from mobee.model import Geometry, WorldObject, box
+from mobee.model.core_tables import CODES, VOLUME, Volumes
+from mobee.model.engine import ATTACHED, ATTACHED_GHOST, GHOST, OBSTACLE, TARGET, Snapshot
 from mobee.model.pose import Pose
-from mobee.model.snapshot import ATTACHED, ATTACHED_GHOST, GHOST, OBSTACLE, TARGET, Snapshot
-from mobee.model.volumes import CODES, VOLUME, Volumes
 from mobee.model.world_object import Role
 from mobee.robot.robot import Robot
 

@@ -51,8 +51,7 @@ from experiments.kit.plots import finish, new_figure
 from experiments.kit.structs import decoded, encoded
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
-from mobee.rendering.motion import Motion
-from mobee.rendering.sheet import Strip, filmstrip
+from mobee.rendering.sheet import Motion, Strip, filmstrip
 
 SOONEST, LATEST = 0.1, 1.2  # s after the start of a crossing
 PIECE = 5  # crossings of a launch

@@ -24,8 +24,7 @@ from experiments.claims.ch3_roadmaps.trm_tasks import EXAMPLES
 from experiments.kit.roadmap_task import LEFT_ARM, Example, Method, build
 from mobee import MobeeError
 from mobee.arrays import Array
-from mobee.rendering.motion import Motion, motion_through
-from mobee.rendering.sheet import Panel, Strip, cloud_solids, filmstrip, marker_cloud, pictures_of, write_sheet
+from mobee.rendering.sheet import Motion, Panel, Strip, cloud_solids, filmstrip, marker_cloud, motion_through, pictures_of, write_sheet
 from mobee.roadmap.building.tasks import Coordinate
 from mobee.roadmap.roadmap import Roadmap
 

@@ -34,8 +34,7 @@ from mobee.arrays import Array
 from mobee.model.kinematics import link_transforms
 from mobee.model.model import Model
 from mobee.model.world_file import load_world
-from mobee.rendering.room import clutter, room
-from mobee.rendering.scene import Scene
+from mobee.rendering.scene import Scene, clutter, room
 from mobee.robot.cameras import cameras_of
 from mobee.robot.load import load_robot
 from mobee.vision.ball import Sighting, find_balls
@@ -46,10 +45,10 @@ from mobee.vision.calibration.solve import calibrate
 from mobee.vision.encoders import Moment
 from mobee.vision.exposure import Cameras
 from mobee.vision.imperfections import CameraErrors, CameraSettings, camera_errors
-from mobee.vision.mount import camera_frames, into
+from mobee.vision.lens import camera_frames, into
 from mobee.vision.objects.detectors import detector_of
-from mobee.vision.objects.eyes import eyes_at
 from mobee.vision.objects.locating import locate_all
+from mobee.vision.objects.placing import eyes_at
 from mobee.vision.objects.thing import things_in
 from mobee.vision.rig import Rig, see_points
 from mobee.vision.stereo import Sighted, rays_meet

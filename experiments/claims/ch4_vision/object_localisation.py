@@ -44,8 +44,7 @@ from experiments.kit.sweep import Cells, Condition, Sweep, grouped
 from mobee.arrays import Array
 from mobee.model.model import Model
 from mobee.model.world_file import load_world
-from mobee.rendering.room import clutter, room
-from mobee.rendering.scene import Scene
+from mobee.rendering.scene import Scene, clutter, room
 from mobee.vision.calibration.calibration import Calibration
 from mobee.vision.calibration.offline import Watcher, watch_hand
 from mobee.vision.calibration.postures import choose_postures
@@ -54,11 +53,10 @@ from mobee.vision.encoders import Moment
 from mobee.vision.exposure import Cameras
 from mobee.vision.imperfections import CameraErrors, CameraSettings, camera_errors
 from mobee.vision.objects.detectors import detector_of
-from mobee.vision.objects.eyes import Eyes, eyes_at
 from mobee.vision.objects.locating import locate_all
-from mobee.vision.objects.placing import Placed
+from mobee.vision.objects.placing import Eyes, Placed, eyes_at
 from mobee.vision.objects.thing import Thing, things_in
-from mobee.vision.objects.tracker import Tracker
+from mobee.vision.objects.track import Tracker
 
 GAZES, LOOKS = 100, 1800  # with the things; pictures without them: 10 minutes at 15 Hz of five robots
 QUICK_GAZES, QUICK_LOOKS = 6, 45

@@ -42,10 +42,8 @@ from mobee.vision.calibration.solve import calibrate
 from mobee.vision.imperfections import CameraSettings, camera_errors
 from mobee.vision.rig import Rig
 from mobee.vision.tag import Tag
-from mobee.vision.teaching.lessons import Lessons, split_by_pose
+from mobee.vision.teaching.lessons import Lessons, split_by_pose, teacher_postures, watch_teacher
 from mobee.vision.teaching.localisers import CORRECTED, REGRESSIONS, localiser, stereo_places
-from mobee.vision.teaching.offline import watch_teacher
-from mobee.vision.teaching.postures import teacher_postures
 
 POSES, LOOKS, POSTURES = 120, 8, 20  # of the Katana; of the iCub for each; of the hand, for the calibration
 QUICK = (8, 3, 12)

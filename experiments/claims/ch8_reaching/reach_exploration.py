@@ -37,10 +37,9 @@ from experiments.kit.statistics import estimate, interquartile_mean, interval, r
 from experiments.kit.sweep import Cells, Condition, Sweep
 from mobee import Model
 from mobee.learning.reaching.reach_agent import ReachAgent
-from mobee.rendering.link_solids import robot_solids
 from mobee.rendering.picture import Picture
 from mobee.rendering.sheet import pictures_of
-from mobee.rendering.solid import Solid, ball
+from mobee.rendering.solid import Solid, ball, robot_solids
 
 CHECKPOINTS = (100, 200, 400, 800, 1600, 3200, 6400)  # problem-tries after which the agents are evaluated
 REPETITIONS = 5  # evaluations at each checkpoint

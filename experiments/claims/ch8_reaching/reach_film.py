@@ -29,12 +29,10 @@ from experiments.kit.reaching.targets import grid, targets_at
 from mobee import CuriousAgent, Lattice, MobeeError, Model, OfflinePlant, ReachAgent
 from mobee.arrays import Array
 from mobee.learning.reaching.record import load_reaches
-from mobee.learning.reaching.store import ReachStore
-from mobee.learning.reaching.tries import Try
+from mobee.learning.reaching.store import ReachStore, Try
 from mobee.reach import TARGET, ReachTarget
 from mobee.rendering.camera import camera_axes
-from mobee.rendering.motion import Motion, recorded
-from mobee.rendering.sheet import Strip, filmstrip
+from mobee.rendering.sheet import Motion, Strip, filmstrip, recorded
 from mobee.store import TransitionStore
 
 TRIES, EPISODES = 800, 60

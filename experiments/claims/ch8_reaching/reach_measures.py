@@ -14,7 +14,7 @@ from experiments.kit.reaching.arm import MARKER, reach_space
 from experiments.kit.reaching.targets import grid
 from experiments.kit.sweep import Cells, runs_by
 from mobee.arrays import Array, Ints
-from mobee.learning.reaching.evaluation import NO_STATE
+from mobee.learning.reaching.reach_agent import NO_STATE
 from mobee.learning.reaching.reaches import hands_of
 
 STRATEGIES = ("intrinsic", "greedy", "random")

@@ -58,7 +58,7 @@ from experiments.kit.sweep import Cells, Condition, Sweep
 from mobee import World, sphere
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
-from mobee.learning.reaching.tries import Problems
+from mobee.learning.reaching.store import Problems
 from mobee.reach import ReachTarget
 from mobee.roadmap.ompl import require_ompl
 

@@ -32,9 +32,8 @@ from mobee.model.model import Model
 from mobee.model.pose import Pose
 from mobee.model.world import World
 from mobee.model.world_file import load_world
-from mobee.rendering.link_solids import robot_solids
 from mobee.rendering.sheet import Panel, pictures_of, write_sheet
-from mobee.rendering.solid import Solid, object_solids
+from mobee.rendering.solid import Solid, object_solids, robot_solids
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
 

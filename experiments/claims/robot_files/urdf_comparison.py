@@ -15,7 +15,7 @@ import numpy as np
 from experiments.bench.peers import import_peer, make_searches_precise
 from experiments.kit.records import Row
 from mobee.arrays import Array
-from mobee.check.subject import Subject
+from mobee.check.interface import Subject
 from mobee.errors import MobeeError
 from mobee.model.kinematics import link_transforms
 from mobee.model.model import Model

@@ -31,7 +31,7 @@ from experiments.kit.experiment import Experiment, Steps
 from experiments.kit.records import Records, Row, read_records
 from mobee import CuriousAgent, Derived, Model, OfflinePlant, derive, load_robot
 from mobee import run as run_agents
-from mobee.check.robot import check_robot
+from mobee.check.run import check_robot
 from mobee.errors import InvalidValue, MobeeError
 from mobee.robot.mjcf.compiled import is_mjcf
 

@@ -12,10 +12,9 @@ import numpy as np
 
 from mobee.arrays import Array, Ints
 from mobee.learning.explorers import choose
-from mobee.learning.reaching.evaluation import NO_STATE, Evaluation, move
 from mobee.learning.reaching.failures import has_failed
-from mobee.learning.reaching.reach_agent import ReachAgent
-from mobee.learning.reaching.tries import Try
+from mobee.learning.reaching.reach_agent import NO_STATE, Evaluation, ReachAgent, move
+from mobee.learning.reaching.store import Try
 from mobee.plant import Plant
 from mobee.reach import ReachTarget
 

@@ -69,7 +69,7 @@ def nearest_pose(
     """Return the pose that brings the marker nearest to a place (3,) m, root frame, by least squares (SLSQP) from random poses.
 
     Contacts are ignored.  The motors `joints`, all of one part, move within their limits; all other motors are at home.  The clauses of
-    this part, which are the constraints of the shoulder's cables, must hold, unlike in `mobee.roadmap.reachable`.  `restarts`: largest
+    this part, which are the constraints of the shoulder's cables, must hold, unlike in `mobee.roadmap.ik.solve`.  `restarts`: largest
     number of start poses.  `seed`: seed of the start poses.  `good`: m, distance at which the search ends.  If no start pose gives a pose
     that satisfies the clauses, the result is home with an infinite distance.
     """

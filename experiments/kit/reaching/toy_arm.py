@@ -32,8 +32,7 @@ from mobee.arrays import Array
 from mobee.errors import InvalidValue
 from mobee.learning.explorers import Draws
 from mobee.learning.reaching.reach_agent import ReachAgent
-from mobee.learning.reaching.tabular import ReachTable
-from mobee.learning.tabular import ideal
+from mobee.learning.tabular import ReachTable, ideal
 from mobee.reach import ReachOutcome, ReachTarget, reward_of
 
 UPPER, FORE = 0.152, 0.20  # m: shoulder to elbow, elbow to palm
@@ -118,7 +117,7 @@ SURE_FAILURES = 20  # failures after which an action is not tried again
 
 
 class ToyArm(ReachTable):
-    """The toy arm as a plant with 81 states, a `mobee.learning.reaching.tabular.ReachTable` (plant whose outcomes are given by tables).
+    """The toy arm as a plant with 81 states, a `mobee.learning.tabular.ReachTable` (plant whose outcomes are given by tables).
 
     `seed`: seed of the random outcomes.  `start`: the first state.
     """

@@ -25,8 +25,7 @@ from mobee import OfflinePlant, Space
 from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
 from mobee.learning.neighbours import NO_ACTION
-from mobee.learning.reaching.evaluation import move, reach
-from mobee.learning.reaching.reach_agent import ReachAgent
+from mobee.learning.reaching.reach_agent import ReachAgent, move, reach
 from mobee.learning.value_iteration import OutcomeModel
 from mobee.reach import ReachPlant, ReachTarget
 

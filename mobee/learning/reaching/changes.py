@@ -16,9 +16,9 @@ import numpy as np
 from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
 from mobee.learning.reaching.failures import FailuresSinceChange, by_target
-from mobee.learning.reaching.planning import REACH, ReachPlanning
 from mobee.learning.reaching.predictors.predictor import RewardPredictor, begin_world
-from mobee.learning.reaching.tries import Step
+from mobee.learning.reaching.reaches import REACH, ReachPlanning
+from mobee.learning.reaching.store import Step
 
 SHARES = np.array([0.01, 0.03, 0.1, 0.2, 0.4, 0.7, 0.95])  # of outcomes that contradict what was learned, equally likely at first
 HAZARDS = np.array([1e-2, 1e-3, 1e-4, 1e-5])  # of a change before an outcome, equally likely at first

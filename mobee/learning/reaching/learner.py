@@ -13,11 +13,10 @@ from mobee.errors import InvalidValue
 from mobee.learning.explorers import Draws, choose
 from mobee.learning.reaching.changes import DETECTORS, NONE, DetectorOf, WorldChanges
 from mobee.learning.reaching.failures import AlikeFailures, Failures, FailuresSinceChange, failures_of, has_failed
-from mobee.learning.reaching.planning import REACH, ReachPlanning
 from mobee.learning.reaching.predictors import PREDICTORS, PredictorOf, Reaches, RewardPredictor
-from mobee.learning.reaching.reaches import SCALE
+from mobee.learning.reaching.reaches import REACH, SCALE, ReachPlanning
+from mobee.learning.reaching.store import Problems, Step, Try, made_of
 from mobee.learning.reaching.strategies import STRATEGIES, StrategyOf
-from mobee.learning.reaching.tries import Problems, Step, Try, made_of
 from mobee.learning.space import Space
 from mobee.learning.transitions import TransitionModel
 from mobee.learning.value_iteration import OutcomeModel

@@ -1,32 +1,73 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Builds task-relevant roadmaps: poses within the tolerances of given costs, spread over a task space, and edges (thesis 3.3)."""
+"""Builds task-relevant roadmaps: poses within the tolerances of given costs, spread over a task space, and edges (thesis 3.3).
+
+`RoadmapSettings` has the method, the choice of edges and the settings of the searches.
+"""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from mobee.arrays import Array
-from mobee.errors import InvalidValue
+from mobee.errors import InvalidValue, UnknownName
 from mobee.model.model import Model
 from mobee.roadmap.building.checkpoint import Checkpoint, Progress, request
 from mobee.roadmap.building.frontier_builder import FrontierBuilder, PoseEvaluator
 from mobee.roadmap.building.lattice_builder import LatticeBuilder
-from mobee.roadmap.building.settings import RoadmapSettings
+from mobee.roadmap.building.search_scheduler import SearchSettings
 from mobee.roadmap.building.tasks import Task
 from mobee.roadmap.ik.costs import collision
 from mobee.roadmap.ik.problem import Cost, Problem
+from mobee.roadmap.ik.solve import METHODS
 from mobee.roadmap.ik.terms import Term
 from mobee.roadmap.roadmap import Roadmap
 
 MAX_THREADS = 4
 LATTICE, FRONTIER = "flood", "front"  # names of the two stages in files
+MAX_TURN = 0.4  # rad: default of `RoadmapSettings.longest`
+
+
+@dataclass(frozen=True, slots=True)
+class RoadmapSettings:
+    """Settings of `build_roadmap`: the search for poses, and the edges between them.
+
+    Raises InvalidValue or UnknownName for a value that is not valid.
+
+    Attributes:
+        method: "nes": evolution strategy, thesis Algorithms 2-4, for any costs and task coordinates.  "least_squares": on a lattice of
+            points in the task space, only for task coordinates with derivatives.  "hybrid": least squares if all task coordinates have
+            derivatives, then the evolution strategy for the regions in which least squares found no poses.
+        neighbours: number of nearest vertices to which each vertex is joined.  None: each vertex is joined to the m nearest of the vertices
+            that were found before it; m: dimension of the task space (Algorithm 4).
+        longest: edges along which a motor turns by more than this [rad] are left out.  None: no edge is left out.
+        margin: distance that every motor keeps from its limits [rad], at most a quarter of its range.  MoBeE's control law pushes motors
+            out of the last 10 degrees, so a robot under this law comes to rest only in poses that keep this margin.
+        search: settings of the searches by evolution strategy.
+    """
+
+    method: Literal["hybrid", "nes", "least_squares"] = "hybrid"
+    neighbours: int | None = None
+    longest: float | None = MAX_TURN
+    margin: float = 0.0
+    search: SearchSettings = field(default_factory=SearchSettings)
+
+    def __post_init__(self) -> None:
+        if self.method not in METHODS:
+            raise UnknownName("method", self.method, METHODS)
+        if self.neighbours is not None and self.neighbours < 1:
+            raise InvalidValue(f"neighbours {self.neighbours!r}: must be at least 1, or None for the dimension of the task space.")
+        if self.longest is not None and not self.longest > 0.0:
+            raise InvalidValue(f"longest {self.longest!r} rad: must be above 0, or None for no limit.")
+
+
 _DEFAULT = RoadmapSettings()
 
 

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from mobee.arrays import Array, Ints
 from mobee.errors import MobeeError
 from mobee.roadmap.building.frontier import MAX_NEAREST, MAX_NEIGHBOURS, MIN_DISTANCE, Flags, Frontier, GrowingArray
-from mobee.roadmap.building.search_scheduler import IDLE, SearchScheduler
-from mobee.roadmap.building.settings import SearchSettings
+from mobee.roadmap.building.search_scheduler import IDLE, SearchScheduler, SearchSettings
 from mobee.roadmap.evolution.nes import default_population
 from mobee.roadmap.ik.problem import Problem
 from mobee.roadmap.ik.terms import Term

@@ -1,17 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Schedules the searches by evolution strategy for new vertices of a roadmap: their start, aim and time limit (thesis Algorithm 4)."""
+"""Schedules the searches by evolution strategy for new vertices of a roadmap, with their settings (thesis Algorithm 4).
+
+A search has a start, an aim and a time limit.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mobee.arrays import Array, Ints
+from mobee.errors import InvalidValue
 from mobee.roadmap.building.frontier import MIN_DISTANCE, Flags, Frontier, GrowingArray, inside_simplex
-from mobee.roadmap.building.settings import SearchSettings
 from mobee.roadmap.evolution.search import Searches
 
 AIM_DISTANCE = 2.0 * MIN_DISTANCE  # spacings between the aims of two simultaneous searches, at least
@@ -26,6 +30,58 @@ STALLED_STD = 1e-4  # in ranges of the motors: a search that is narrower has fai
 KNOWN_VERTICES = {1: 16, 2: 48, 3: 96}  # number of vertices that a search compares with, by the dimension of the task space
 MANY_KNOWN_VERTICES = 192  # in higher dimensions
 IDLE, FIRST = -1, -2  # in place of a start vertex
+
+_FIT_RADIUS = 2.5  # spacings
+_SAME_BRANCH = 0.2  # of a motor's range: postures that differ by more are not fitted together
+_DAMPING = 0.1  # spacings squared
+
+
+@dataclass(frozen=True, slots=True)
+class SearchSettings:
+    """Settings of the searches by evolution strategy for the poses (vertices) of a roadmap (thesis Algorithm 4; see docs/roadmaps.md).
+
+    The spacing is the distance between neighbouring vertices in the task space. Raises InvalidValue for a value out of range.
+
+    Attributes:
+        delta: decrease of a vertex's expansion weight (1 at first; no search starts from a vertex of weight 0 or less) for each failed
+            search that started from the vertex.
+        frontier: True: start a search only where a point one spacing away is free, and aim at this point.  False: start from all vertices,
+            without an aim, as printed in the thesis.
+        predict: True: a search that has an aim begins at a posture extrapolated from the neighbours' postures.  False: at the posture of
+            its vertex.
+        std: largest standard deviation of a search from a vertex, as a fraction of each motor's range.
+        wide_std: standard deviation of a search for the first pose, or where another search has failed, as a fraction of each motor's
+            range.
+        population: samples per generation; None: 4 + 3 ln(d), rounded down, for d motors that may move.
+        patience: factor on the time limit: a search fails after patience * G generations, but not before 100 / m (m: dimension of the task
+            space).  G: number of generations within which 3/4 of the recent successful searches found their vertex.  The limit is 30 d
+            generations until 8 searches have succeeded, and 4 times as long where another search has failed.
+        tries: largest number of failed searches around a point.  After so many failed searches with aims within half a spacing of a point,
+            no further search aims at this point.
+        searches: number of simultaneous searches.
+    """
+
+    delta: float = 0.5
+    frontier: bool = True
+    predict: bool = True
+    std: float = 0.02
+    wide_std: float = 0.2
+    population: int | None = None
+    patience: float = 3.0
+    tries: int = 3
+    searches: int = 32
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.delta <= 1.0:
+            raise InvalidValue(f"delta {self.delta!r}: must be above 0 and at most 1.")
+        for name in ("std", "wide_std"):
+            if not 0.0 < getattr(self, name) <= 1.0:
+                raise InvalidValue(f"{name} {getattr(self, name)!r}: must be above 0 and at most 1, in ranges of the motors.")
+        if self.population is not None and self.population < 4:
+            raise InvalidValue(f"population {self.population!r}: must be at least 4, or None.")
+        for name in ("patience", "tries", "searches"):
+            if getattr(self, name) < 1:
+                raise InvalidValue(f"{name} {getattr(self, name)!r}: must be at least 1.")
 
 
 class SearchScheduler:
@@ -211,11 +267,6 @@ class SearchScheduler:
         furthest = squares.argmax(axis=1)
         nearer = ((point - centres) ** 2).sum(axis=1) < squares[np.arange(len(active)), furthest]
         self.near[active[nearer], furthest[nearer]] = point
-
-
-_FIT_RADIUS = 2.5  # spacings
-_SAME_BRANCH = 0.2  # of a motor's range: postures that differ by more are not fitted together
-_DAMPING = 0.1  # spacings squared
 
 
 def predicted_posture(frontier: Frontier, postures: Array, vertex: int, aim: Array) -> Array:

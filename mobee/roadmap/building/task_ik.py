@@ -9,8 +9,8 @@ from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
 from mobee.model.pose import Pose
 from mobee.roadmap.building.tasks import Task
-from mobee.roadmap.ik.least_squares import Descent, aim_reals
 from mobee.roadmap.ik.problem import Problem
+from mobee.roadmap.ik.solve import Descent, aim_reals
 from mobee.roadmap.ik.terms import Aim
 
 
@@ -87,7 +87,7 @@ class TaskIK:
         return violations, costs
 
     def _reals(self, y: Array) -> Array:
-        """Return the numbers of the coordinates' aims, a row per task point, see `least_squares.aim_reals`."""
+        """Return the numbers of the coordinates' aims, a row per task point, see `mobee.roadmap.ik.solve.aim_reals`."""
         columns = []
         for number, cache in enumerate(self._cache):
             values, which = np.unique(y[:, number], return_inverse=True)

@@ -1,9 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compiles an MJCF file with the package mujoco; the result gives names and kinds as text. Only this module imports mujoco."""
+"""Compiles an MJCF file with the package mujoco, and finds the files of MuJoCo Menagerie with the package mujoco-menagerie.
+
+The compiled model gives names and kinds as text. mujoco-menagerie downloads a robot at its first use. In the library, only this module
+imports these two packages.
+"""
 
 from __future__ import annotations
 
+import importlib.util
 import re
+import warnings
 import xml.sax
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,11 +20,12 @@ from typing import Any
 import numpy as np
 
 from mobee.arrays import Array, Ints
-from mobee.errors import NotInstalled, RobotFileError
-from mobee.robot.urdf.frames import Frame
+from mobee.errors import NotInstalled, RobotFileError, Simplified
+from mobee.robot.urdf.tree import Frame
 from mobee.robot.xml.file import LineHandler, is_file, parse_content, read_content
 
 ROOT = "mujoco"  # the root element of an MJCF file
+MENAGERIE = "mujoco_menagerie"
 
 
 class _RootTag(LineHandler):
@@ -207,3 +214,34 @@ def _lines(spec: Any) -> dict[str, tuple[int, ...]]:
                 numbers[element.id] = int(word[0])
         found[kind] = tuple(numbers.tolist())
     return found
+
+
+def menagerie_names() -> tuple[str, ...]:
+    """Return the names of the robots of MuJoCo Menagerie; empty if the package mujoco-menagerie is not installed."""
+    if importlib.util.find_spec(MENAGERIE) is None:
+        return ()
+    import mujoco_menagerie
+
+    return tuple(mujoco_menagerie.names())
+
+
+def menagerie_file(name: str) -> Path | None:
+    """Return the path of the MJCF file of a robot of MuJoCo Menagerie; download it if necessary, with a warning before.
+
+    The name may omit the maker if it is unambiguous: "panda" is "franka_emika_panda". Returns None if Menagerie has no such robot, or the
+    package mujoco-menagerie is not installed. Raises RobotFileError if the download fails.
+    """
+    names = menagerie_names()
+    found = [name] if name in names else [known for known in names if known.endswith(f"_{name}")]
+    if len(found) != 1:
+        return None
+    import mujoco_menagerie
+
+    robot, cache = mujoco_menagerie.get(found[0]), mujoco_menagerie.Cache()
+    if cache.root is None and not cache.is_cached(robot):
+        size = (robot.download_size or 0) / 1e6
+        warnings.warn(f"mujoco-menagerie downloads {found[0]} ({size:.0f} MB) into {cache.dir}", Simplified, stacklevel=4)
+    try:
+        return Path(robot.xml(robot.default_model))
+    except mujoco_menagerie.MenagerieError as error:
+        raise RobotFileError(f"{name}: mujoco-menagerie cannot give this robot: {error}. Give the path of a file instead.") from None

@@ -15,17 +15,15 @@ from mobee.arrays import Array
 from mobee.errors import InvalidValue, RobotFileError, Simplified
 from mobee.robot.bodies import one_a_link
 from mobee.robot.mjcf.compiled import Compiled, compile_mjcf
-from mobee.robot.mjcf.couplings import drives_of, held_joints, loops
-from mobee.robot.mjcf.motors import home_pose, read_motor
-from mobee.robot.mjcf.shapes import WITHOUT_BODY, read_solids
-from mobee.robot.mjcf.visuals import read_cameras, read_visuals
+from mobee.robot.mjcf.motors import drives_of, held_joints, home_pose, loops, read_motor
+from mobee.robot.mjcf.shapes import WITHOUT_BODY, read_cameras, read_solids, read_visuals
 from mobee.robot.robot import Body, Joint, Marker, Motor, Part, Robot, Shape
-from mobee.robot.urdf.frames import Frame
 from mobee.robot.urdf.motors import Drive
 from mobee.robot.urdf.pairs import PairRules, adjacent_links, shape_pairs, untested_links
 from mobee.robot.urdf.read import UrdfOptions, check_options, free_name
 from mobee.robot.urdf.shapes import grown
 from mobee.robot.urdf.srdf import Srdf
+from mobee.robot.urdf.tree import Frame
 from mobee.robot.xml.node import SMALLEST
 
 MOST_NAMED = 3  # elements that a warning lists

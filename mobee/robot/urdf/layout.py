@@ -12,9 +12,8 @@ import numpy as np
 from mobee.arrays import Array
 from mobee.robot.bodies import from_six, one_a_link
 from mobee.robot.robot import Body, Joint, Marker
-from mobee.robot.urdf.frames import IDENTITY, Frame, bounded, child, read_origin, triple
 from mobee.robot.urdf.motors import stated_limits
-from mobee.robot.urdf.tree import Tree, UrdfJoint
+from mobee.robot.urdf.tree import IDENTITY, Frame, Tree, UrdfJoint, bounded, child, read_origin, triple
 from mobee.robot.xml.node import SMALLEST, Node
 from mobee.robot.xml.volume import Z, turn_about
 

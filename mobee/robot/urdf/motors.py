@@ -12,8 +12,7 @@ import numpy as np
 from mobee.arrays import Array
 from mobee.robot.motor_units import angle_unit, outside_zones
 from mobee.robot.robot import Motor
-from mobee.robot.urdf.frames import FARTHEST, bounded, child
-from mobee.robot.urdf.tree import UrdfJoint, read_name
+from mobee.robot.urdf.tree import FARTHEST, UrdfJoint, bounded, child, read_name
 from mobee.robot.xml.node import Node, listed, nearest
 
 LEAST = 1e-6  # of a factor between a joint and its motor

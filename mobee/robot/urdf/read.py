@@ -16,10 +16,9 @@ from mobee.robot.urdf.hull import CORNERS, FEWEST, Corners
 from mobee.robot.urdf.layout import Skeleton, lay_out, read_bodies, read_markers
 from mobee.robot.urdf.motors import Drive, read_drives, read_motor
 from mobee.robot.urdf.pairs import OwnFields, PairRules, adjacent_links, shape_pairs, untested_links
-from mobee.robot.urdf.shapes import Meshes, ShapeReader, grown
+from mobee.robot.urdf.shapes import Meshes, ShapeReader, grown, read_visuals
 from mobee.robot.urdf.srdf import Home, Srdf, choose_home, find_srdf, homed, read_parts, read_srdf
 from mobee.robot.urdf.tree import Tree, UrdfJoint, read_tree
-from mobee.robot.urdf.visuals import read_visuals
 from mobee.robot.xml.node import Node, read_xml
 from mobee.robot.xml.pairs import without_ignored
 

@@ -12,9 +12,8 @@ import numpy as np
 
 from mobee.errors import UnknownName
 from mobee.robot.robot import Motor
-from mobee.robot.urdf.frames import bounded
 from mobee.robot.urdf.motors import Drive
-from mobee.robot.urdf.tree import Tree, UrdfJoint
+from mobee.robot.urdf.tree import Tree, UrdfJoint, bounded
 from mobee.robot.xml.node import Node, nearest, read_xml, shown
 
 NamePair = frozenset[str]

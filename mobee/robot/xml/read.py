@@ -23,14 +23,28 @@ from mobee.robot.join import Placed, join_placed
 from mobee.robot.pairs import hand_links, joined_links, link_pairs, merged, tested_pairs
 from mobee.robot.pairs_2014 import Rule, published_pairs, published_untested
 from mobee.robot.robot import Joint, LinkPair, Part, Robot
-from mobee.robot.xml.body import CONVEX_ATTRIBUTES, MASS_ATTRIBUTES, MOST_SHAPES, read_marker, read_mass, read_shape, read_skeleton
-from mobee.robot.xml.draft import Draft, Place, enter
+from mobee.robot.xml.body import (
+    CAMERA_ATTRIBUTES,
+    CONVEX_ATTRIBUTES,
+    MASS_ATTRIBUTES,
+    MOST_SHAPES,
+    VISUAL_ATTRIBUTES,
+    Draft,
+    Place,
+    enter,
+    finished_cameras,
+    read_camera,
+    read_marker,
+    read_mass,
+    read_shape,
+    read_skeleton,
+    read_visual,
+)
 from mobee.robot.xml.file import is_file
 from mobee.robot.xml.motors import finish_joints, order_motors, read_clauses, read_motor
 from mobee.robot.xml.node import Node, listed, nearest, read_xml, shown
 from mobee.robot.xml.pairs import IGNORE_ATTRIBUTES, without_ignored
 from mobee.robot.xml.versions import report, upgrade_robot
-from mobee.robot.xml.visual import CAMERA_ATTRIBUTES, VISUAL_ATTRIBUTES, finished_cameras, read_camera, read_visual
 from mobee.robot.xml.volume import AXIS, PLACE, STEP, VOLUME_TAGS, Z, align, direction, link_step, turn_about
 
 ROBOTS = Path(__file__).parents[1] / "robots"

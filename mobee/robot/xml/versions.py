@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Versions of the grammar: rewrites older files into today's form before they are read.
+"""Rewrites files of older versions into today's grammar before they are read.
 
 | version attribute of the root | form |
 | --- | --- |
@@ -8,13 +8,15 @@
 | 1.0, or none | the programs of 2010 to 2014; or MoBeE 0.1, which wrote 1.0 too, if the file has a tag or attribute that was new in 0.1 |
 
 MoBeE 0.1 differs from today in three rules: elements inside a <link> were placed relative to the link's end; a box was turned by the
-smallest rotation that takes its y axis to the height axis (hx, hy, hz); and a marker without a normal had +z. original.py lists the
-differences of the older programs.
+smallest rotation that takes its y axis to the height axis (hx, hy, hz); and a marker without a normal had +z. original.py rewrites robot
+files of the older programs and lists their differences. World files of VirtualSkin and MoBeE of 2011 to 2014 have the root element
+<WorldList>; `rewrite_world_list` makes a <World> of it.
 """
 
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
@@ -25,9 +27,20 @@ from mobee.arrays import Array
 from mobee.errors import OlderVersion
 from mobee.robot.writing import degrees, number, numbers
 from mobee.robot.xml.node import VERSION, Node, Remark, descendants, shown
-from mobee.robot.xml.original import find_evidence, rewrite_original
-from mobee.robot.xml.original_world import rewrite_world_list
-from mobee.robot.xml.volume import AXIS, PLACE, VOLUME_TAGS, Y, align, direction, height_along, height_and_angle, link_step, turn_about
+from mobee.robot.xml.original import VOLUMES, at_line, find_evidence, free_name, rewrite_original, vector_texts
+from mobee.robot.xml.volume import (
+    AXIS,
+    PLACE,
+    UPRIGHT,
+    VOLUME_TAGS,
+    Y,
+    align,
+    direction,
+    height_along,
+    height_and_angle,
+    link_step,
+    turn_about,
+)
 
 Version = Literal["2.0", "1.0", "0.1"]
 WORLD_TAGS = ("world", "worldlist")
@@ -47,6 +60,7 @@ _OF_0_1: dict[str, frozenset[str]] = {
     "box": frozenset({"name", "base"}),
 }
 _TAGS_OF_0_1 = frozenset({"capsule", "convex", "mass", "ignore", "robot"})
+LOWEST = 1e-6  # m; a shorter height axis counts as none, as in Qt
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,3 +207,74 @@ def report(remarks: list[Remark]) -> None:
     for remark in remarks:
         if remark.severity == "warning":
             remark.node.warn(f"{remark.what}. {remark.remedy}" if remark.remedy else remark.what, OlderVersion)
+
+
+def rewrite_world_list(root: Node) -> list[Remark]:
+    """Rewrite a <WorldList> of 2011 to 2014 into a <World>, in place; return remarks for the user on the interpretation.
+
+    An object of a <WorldList> has a frame, and volumes whose poses are relative to this frame; in a <World> each volume is an object. If an
+    object has one volume, the volume gets the object's name; if it has several, each gets the name with a number appended. Colours of 0 to
+    255 are converted. A target exerted no force in 2014; here it repels all links except the hand that reaches for it.
+    """
+    remarks = [Remark(root, "read as a world of VirtualSkin or MoBeE, 2011 to 2014: <WorldList>", severity="note")]
+    remarks += [Remark(at_line(root, repair.line), repair.what, repair.remedy) for repair in root.repairs]
+    volumes: list[Node] = []
+    taken: Counter[str] = Counter()
+    for index, node in enumerate(root.children, start=1):
+        if node.tag != "object":
+            remarks.append(Remark(node, "unknown tag is ignored with all inside"))
+            continue
+        mine = [child for child in node if child.tag in VOLUMES]
+        remarks += [Remark(child, "unknown tag is ignored with all inside") for child in node if child.tag not in VOLUMES]
+        if not mine:
+            remarks.append(Remark(node, "the object holds no volume and is ignored", "Put a <sphere>, <cylinder> or <box> into it"))
+        given = node.optional("name") or f"object{index}"
+        for number_of, child in enumerate(mine, start=1):
+            name = given if len(mine) == 1 else f"{given}_{number_of}"
+            taken[name] += 1
+            if taken[name] > 1:
+                remarks.append(
+                    Remark(child, f"a second object {shown(name)!r} is called '{shown(name)}_{taken[name]}'", "Rename it", "note")
+                )
+                name = free_name(f"{name}_{taken[name]}", taken)
+                taken[name] += 1
+            volumes.append(_world_volume(node, child, name))
+        if node.optional("type") == "target":
+            what = "a target exerted no force in 2014; here it repels all but the link that reaches for it"
+            remarks.append(Remark(node, what, 'Write role="ghost" for a thing without force', "note"))
+    root.tag, root.children = "world", volumes
+    return remarks
+
+
+def _world_volume(thing: Node, volume: Node, name: str) -> Node:
+    """Return one volume of an object with its pose in the root frame; raises RobotFileError if its type is not obstacle or target."""
+    attributes = {key: text for key, text in volume.attributes.items() if key not in (*PLACE, *AXIS, "angle", "name")}
+    frame, mirrored = _object_rotation(thing)
+    turn, _ = _object_rotation(volume)
+    shift = frame @ volume.vector(PLACE)
+    rotation = frame @ turn
+    attributes |= {"name": name} | vector_texts(PLACE, thing.vector(PLACE) + (-shift if mirrored else shift))
+    if volume.tag == "box":
+        axis, angle = height_and_angle(rotation)
+        attributes |= vector_texts(AXIS, axis) | {"angle": degrees(angle)}
+    elif volume.tag == "cylinder":
+        attributes |= vector_texts(AXIS, rotation[:, 1])
+    kind = thing.choice("type", thing.optional("type") or "obstacle", ("obstacle", "target"), "type of object")
+    attributes["role"] = kind
+    if thing.attributes.keys() & {"r", "g", "b"}:
+        channels = [min(max(thing.number(channel, 0.0), 0.0), 255.0) / 255.0 for channel in "rgb"]
+        attributes["color"] = " ".join(f"{channel:.4g}" for channel in [*channels, 1.0])
+    return Node(volume.file, volume.line, volume.tag, attributes)
+
+
+def _object_rotation(node: Node) -> tuple[Array, bool]:
+    """Return the rotation (3, 3) of an object or volume, and whether the program of 2014 mirrored it, as it did for an axis along -y."""
+    if np.linalg.norm(node.vector(AXIS)) <= LOWEST:
+        axis = Y
+    else:
+        axis = direction(node, AXIS)
+    mirrored = bool(np.hypot(axis[0], axis[2]) <= UPRIGHT and axis[1] < 0)
+    angle = np.deg2rad(node.number("angle", 0.0))
+    if mirrored:  # every volume is symmetric about its centre: only the positions of an object's volumes are mirrored
+        return turn_about(axis, angle), True
+    return height_along(axis, angle), False

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -13,13 +14,13 @@ from mobee.arrays import Array
 from mobee.errors import InvalidValue
 from mobee.robot.bodies import to_six
 from mobee.robot.motor_units import slides
-from mobee.robot.robot import Body, Clause, Joint, Motor, Robot, Shape
+from mobee.robot.robot import Body, Clause, Joint, MeshSource, Motor, Robot, Shape
+from mobee.robot.urdf.mesh import mesh_name
 from mobee.robot.writing import Drive, degrees, drives_of, number, numbers
 from mobee.robot.xml.node import DEEPEST, VERSION, Remark, read_xml, tree_of, write_tree
 from mobee.robot.xml.pairs import ignore_elements
 from mobee.robot.xml.versions import WORLD_TAGS, upgrade_robot, upgrade_world
-from mobee.robot.xml.visual import visual_elements
-from mobee.robot.xml.volume import height_and_angle
+from mobee.robot.xml.volume import PLACE, height_and_angle
 
 DIGITS = 1e-14  # m; smaller values are rounding errors of a sum
 
@@ -99,7 +100,7 @@ def _write_link(robot: Robot, drives: tuple[Drive, ...], into: ET.Element, link:
         if depth > DEEPEST - 4:
             raise InvalidValue(f"link {robot.links[here]!r} is too deep in the tree: a file holds {DEEPEST} elements inside each other.")
         _write_body(robot, element, here, origin)
-        element.extend(visual_elements(robot, here, origin, path))
+        element.extend(_visual_elements(robot, here, origin, path))
         for index, joint in enumerate(robot.joints):
             if joint.parent != here:
                 continue
@@ -141,6 +142,35 @@ def _write_body(robot: Robot, element: ET.Element, link: int, origin: Array) -> 
         if marker.link == link:
             place = _vector(("px", "py", "pz"), marker.position - origin) | _vector(("nx", "ny", "nz"), marker.normal)
             ET.SubElement(element, "marker", {"name": marker.name} | place | {"rotation": numbers(marker.rotation.reshape(9))})
+
+
+def _visual_elements(robot: Robot, link: int, origin: Array, path: Path) -> Iterable[ET.Element]:
+    """Yield the <visual> and <camera> elements of a link.
+
+    `link`: its index. `origin`: (3,) m, root frame at zero pose, the point to which the positions in the file are relative. `path`: path of
+    the file into which the elements are written.
+    """
+    for visual in robot.visuals:
+        if visual.link == link:
+            what = _mesh(visual.mesh, path) if visual.mesh else {"shape": visual.kind, "size": numbers(visual.size)}
+            color = {} if visual.color is None else {"color": numbers(visual.color)}
+            yield ET.Element("visual", what | _placed(visual.position - origin, visual.rotation) | color)
+    for camera in robot.cameras.values():
+        if camera.link == link:
+            hides = " ".join(robot.links[one] for one in sorted(camera.hidden))
+            rest = {"view": number(camera.view_deg)} | ({"hides": hides} if hides else {})
+            yield ET.Element("camera", {"name": camera.name} | _placed(camera.position - origin, camera.rotation) | rest)
+
+
+def _placed(position: Array, rotation: Array) -> dict[str, str]:
+    place = {name: number(value) for name, value in zip(PLACE, position.tolist(), strict=True)}
+    return place | ({} if np.array_equal(rotation, np.eye(3)) else {"rotation": numbers(rotation.reshape(9))})
+
+
+def _mesh(mesh: MeshSource, path: Path) -> dict[str, str]:
+    name = {"mesh": mesh.name} if mesh.name else {}
+    scale = {} if mesh.scale == (1.0, 1.0, 1.0) else {"scale": numbers(mesh.scale)}
+    return {"file": mesh_name(mesh, path)} | name | scale
 
 
 def _mass(body: Body, origin: Array) -> ET.Element:

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The result of a calibration, and its file."""
+"""Observations of the tag on a robot's palm, and the result of a calibration with its file."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -13,15 +13,33 @@ import numpy as np
 
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
-from mobee.robot.robot import Robot
-from mobee.robot.visual import Camera
+from mobee.robot.robot import Camera, Robot
 from mobee.robot.writing import write_whole
+from mobee.vision.encoders import Moment
 from mobee.vision.imperfections import CameraErrors
 from mobee.vision.lens import Lens
 from mobee.vision.rig import Rig
 from mobee.vision.tag import Tag
 
 FORMAT = "mobee calibration 1"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Observation:
+    """The tag on the robot's palm in the pictures of all cameras with the same stamp (time of the picture).
+
+    `moment`: the encoders at the stamp. `corners`: by name of the camera, the corners (4, 2) px of the tag, column and row, in the order of
+    `Tag.corners`; a camera that does not see the tag is missing.
+    """
+
+    moment: Moment
+    corners: Mapping[str, Array]
+
+
+def stacked(observations: Sequence[Observation]) -> tuple[Array, Array, Array]:
+    """Return the encoders q (N, n) rad, their velocities dq (N, n) rad/s and the variances of q (N, n) rad^2 of N observations."""
+    moments = [one.moment for one in observations]
+    return np.array([one.q for one in moments]), np.array([one.dq for one in moments]), np.array([one.variance for one in moments])
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,10 +10,9 @@ import numpy as np
 
 from mobee.arrays import Array
 from mobee.model.model import Model
-from mobee.rendering.room import clutter, room
-from mobee.rendering.scene import Picture, Scene
+from mobee.rendering.scene import Picture, Scene, clutter, room
 from mobee.simulation.plant import OfflinePlant
-from mobee.vision.calibration.observations import Observation
+from mobee.vision.calibration.calibration import Observation
 from mobee.vision.encoders import Moment, moment_at
 from mobee.vision.exposure import Cameras
 from mobee.vision.imperfections import HEAD, CameraErrors, CameraSettings

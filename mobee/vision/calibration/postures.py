@@ -10,7 +10,7 @@ from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
 from mobee.model.model import Model
 from mobee.vision.imperfections import CameraSettings
-from mobee.vision.mount import camera_frames, into
+from mobee.vision.lens import camera_frames, into
 from mobee.vision.rig import Rig
 
 BATCH, FIRST, NEXT = 4_000, 60, 14  # postures drawn at once; how often at most until one fits; and how often about those that fit

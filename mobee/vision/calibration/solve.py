@@ -12,10 +12,9 @@ from scipy.optimize import least_squares
 from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
 from mobee.model.kinematics import link_transforms
-from mobee.vision.calibration.calibration import Calibration, Quality, Unobservable
-from mobee.vision.calibration.observations import Observation, stacked
+from mobee.vision.calibration.calibration import Calibration, Observation, Quality, Unobservable, stacked
 from mobee.vision.imperfections import CameraSettings
-from mobee.vision.mount import mounted
+from mobee.vision.lens import mounted
 from mobee.vision.rig import Rig, see_tag
 from mobee.vision.stereo import Sighted, locate
 from mobee.vision.tag import Tag

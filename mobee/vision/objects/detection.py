@@ -1,14 +1,31 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Detections: the regions of one picture that may show a thing, an object of known shape, size and colour."""
+"""Detections: the regions of one picture that may show a thing, an object of known shape, size and colour.
+
+A detector finds them; `by_color` makes one that finds the colours of the things, with outlines to a fraction of a pixel.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
+from mobee._core.vision import regions
 from mobee.arrays import Array
 from mobee.rendering.scene import Picture
+from mobee.rendering.solid import Color
 from mobee.vision.objects.thing import Thing
+
+AREA = 40.0  # px: smaller regions are ignored
+AROUND = 5  # px: side of the square in which the likeness of a whole pixel is looked up
+FEWEST = 16  # points of an outline
+MOST = 100  # points of an outline that are kept
+SOLID = 0.6  # share of its convex hull that a region must fill: the things are convex
+HUE = float(np.tan(np.deg2rad(20.0)))  # of the largest angle from the thing's hue
+PALE = 0.35  # share of the thing's saturation below which a pixel is not of its colour
+LEAST = 30  # of 255: brightness of colour below which there is only noise
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,3 +53,56 @@ Detector = Callable[[Picture], Sequence[Detection]]
 
 DetectorOf = Callable[[Sequence[Thing]], Detector]
 """A function that takes things and returns a detector of these things."""
+
+
+def outlined(name: str, likeness: NDArray[np.float32]) -> list[Detection]:
+    """Return the regions of a picture that show a thing (an object of known shape, size and colour), as detections.
+
+    `name`: name of the thing. `likeness`: (H, W), either the share of each pixel that the thing covers, 0 to 1, or larger numbers that are
+    proportional to this share. The share of a pixel is computed as its number divided by the largest number of its region in the 5 x 5
+    pixels around it, or by 1 if the largest number is below 1. Left out are regions of less than 40 pixels, regions with fewer than 16
+    outline points inside the picture's border, and regions that fill less than 60 % of their convex hull.
+    """
+    height, width = likeness.shape
+    found = []
+    for region in regions(likeness, AREA, AROUND):
+        outline, filled = region.outline, min(1.0, region.area / max(region.hull, 1e-9))
+        within = ((outline > 0.5) & (outline < (width - 1.5, height - 1.5))).all(axis=1)
+        if within.sum() < FEWEST or filled < SOLID:
+            continue
+        every = np.linspace(0, within.sum() - 1, min(MOST, int(within.sum()))).astype(int)
+        found.append(Detection(name, outline[within][every], float(region.area), filled * float(within.mean())))
+    return found
+
+
+def by_color(things: Sequence[Thing]) -> Detector:
+    """Return a detector that finds regions with the colours of the given things."""
+
+    def detect(picture: Picture) -> list[Detection]:
+        channels = np.ascontiguousarray(picture.reshape(-1, 3).T)
+        spread = channels.max(axis=0) - channels.min(axis=0)
+        colored = np.flatnonzero(spread >= LEAST)
+        pixels = channels[:, colored].astype(np.float32)
+        found = []
+        for thing in things:
+            likeness = np.zeros(picture.shape[:2], np.float32)
+            likeness.flat[colored] = _likeness(pixels, thing.color)
+            found += outlined(thing.name, likeness)
+        return found
+
+    return detect
+
+
+def _likeness(pixels: NDArray[np.float32], color: Color) -> NDArray[np.float32]:
+    """Return how much of a colour is in each of some pixels (3, m): linear in the share of the pixel that has the colour; else 0."""
+    wanted = np.array(color, np.float32)
+    chroma = wanted - wanted.mean()
+    strength = float(np.linalg.norm(chroma))
+    chroma /= strength
+    along: NDArray[np.float32] = chroma @ pixels
+    along[along < np.maximum(LEAST, PALE * strength / float(wanted.max()) * pixels.max(axis=0))] = 0.0
+    some = np.flatnonzero(along)
+    chosen = pixels[:, some]
+    across = ((chosen - chosen.mean(axis=0)) ** 2).sum(axis=0) - along[some] ** 2
+    along[some[across > (HUE * along[some]) ** 2]] = 0.0
+    return along

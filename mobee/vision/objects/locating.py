@@ -12,10 +12,8 @@ from numpy.typing import NDArray
 from mobee.arrays import Array
 from mobee.model.world_object import WorldObject
 from mobee.vision.objects.detection import Detection
-from mobee.vision.objects.eyes import Eye, Eyes
-from mobee.vision.objects.placing import FARTHEST, NEAREST, Outline, Placed, place
-from mobee.vision.objects.silhouette import surface
-from mobee.vision.objects.thing import Thing
+from mobee.vision.objects.placing import FARTHEST, NEAREST, Eye, Eyes, Outline, Placed, place
+from mobee.vision.objects.thing import Thing, surface
 
 GAP = 0.03  # m between the rays through the middles of two outlines
 LIKELY_SIZE = (0.5, 2.0)  # of the usual diameter: what two outlines may have by their areas

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The position, size and orientation of a thing from its outlines in two pictures, by robust least squares, with their covariance."""
+"""The position, size and orientation of a thing from its outlines in two pictures, by robust least squares, with their covariance.
+
+`Eyes` has the positions of the cameras at the stamp of a picture, and their uncertainty, for all cameras together.
+"""
 
 from __future__ import annotations
 
@@ -8,14 +11,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mobee._core.silhouettes import Silhouette
+from mobee._core.vision import Silhouette
 from mobee.arrays import Array
+from mobee.model.kinematics import link_transforms, point_jacobian
+from mobee.vision.encoders import Moment
+from mobee.vision.lens import Lens, camera_frames, right_slope, rotation_of
 from mobee.vision.objects.detection import Detection
-from mobee.vision.objects.eyes import Eye, Eyes
-from mobee.vision.objects.silhouette import SCALED, touching, upright
-from mobee.vision.objects.thing import Thing
+from mobee.vision.objects.thing import SCALED, Thing, touching, upright
+from mobee.vision.rig import Rig
 from mobee.vision.stereo import nearest_to_rays
 
+NEGLIGIBLE = 1e-12  # share of the largest variance below which a direction is left out
 EDGE = 0.3  # px, standard deviation of a point on an outline; this and the next three were measured in rendered pictures
 SHIFT = 0.08  # px, of the whole outline in one picture, along column and row
 SHIFT_BOTH = 0.12  # px, of the outlines in both pictures together: the light comes from one side
@@ -33,6 +39,78 @@ SECTORS, LEAST_ARC = 24, 0.6  # of the silhouette; share of them in which there 
 MOST_MISFIT = 0.5  # px, weighted rms of the residuals
 NEAREST, FARTHEST = 0.08, 1.0  # m, from a camera
 MOST_SIZE = 3.5  # deviations of a length from its usual value
+_ANGLES = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+_NORMALS = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Eye:
+    """A camera in the root frame.
+
+    `position`: (3,) m, of the optical centre. `rotation`: (3, 3) with the columns right, down, ahead. `lens`: lens of the camera.
+    """
+
+    position: Array
+    rotation: Array
+    lens: Lens
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Eyes:
+    """The E cameras of a robot at one stamp (time of a picture), with the uncertainty of their poses.
+
+    `names`: the cameras; `eyes` and the rows below have the same order. An uncertainty is a factor F (6 E, r): F F' is the covariance of
+    the pose errors of all cameras together. F has six rows for each camera: the displacement of its optical centre along x, y and z of the
+    root frame [m], then its rotation about the directions x, y and z of the root frame, through the optical centre [rad]. There are two
+    such factors, each with its own r. `noise`: for the errors that are new in each picture (of encoders and stamp). `bias`: for the errors
+    that stay the same while the gaze does not change (of the calibration).
+    """
+
+    names: tuple[str, ...]
+    eyes: tuple[Eye, ...]
+    noise: Array
+    bias: Array
+
+
+def eyes_at(rig: Rig, x: Array, moment: Moment, uncertainty: Array | None = None, jitter: float = 0.0) -> Eyes:
+    """Return the cameras of a rig, with their uncertainty, at the stamp (time) of a picture.
+
+    Args:
+        rig: the robot and its cameras.
+        x: the calibration's parameters (P,).
+        moment: encoder values at the stamp, with velocities and variances.
+        uncertainty: covariance (P, P) of the parameters; None: they are exact.
+        jitter: standard deviation of the error of the stamp, s.
+    """
+    transforms = link_transforms(rig.robot, rig.posture(x, moment.q, moment.dq))
+    eyes, motions, slopes = [], [], []
+    for name, camera in rig.cameras.items():
+        mount = x[rig.where(name)]
+        position, rotation = camera_frames(camera, transforms, mount)
+        by_posture = point_jacobian(rig.robot, transforms, camera.link, position)
+        by_parameters = np.zeros((6, len(x)))
+        first = rig.where(name).start
+        by_parameters[:3, first : first + 3] = rotation @ rotation_of(mount[3:]).T
+        by_parameters[3:, first + 3 : first + 6] = rotation @ right_slope(mount[3:])
+        by_parameters[:, rig.where("encoder")] = by_posture[:, list(rig.head)]
+        by_parameters[:, rig.where("latency")] = -(by_posture @ moment.dq)[:, None]
+        eyes.append(Eye(position, rotation, rig.lens))
+        motions.append(by_posture)
+        slopes.append(by_parameters)
+    motion, slope = np.concatenate(motions), np.concatenate(slopes)
+    late = jitter * (motion @ moment.dq)
+    noise = _factor((motion * moment.variance) @ motion.T + np.outer(late, late))
+    bias = np.zeros((len(slope), 0)) if uncertainty is None else _factor(slope @ uncertainty @ slope.T)
+    return Eyes(tuple(rig.cameras), tuple(eyes), noise, bias)
+
+
+def _factor(covariance: Array) -> Array:
+    """Return F (n, r) with F F' = covariance."""
+    scale = np.sqrt(np.maximum(np.diag(covariance), 1e-30))  # displacements and turns have different units
+    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    kept = values > NEGLIGIBLE * max(values.max(), 1e-30)
+    factor: Array = scale[:, None] * vectors[:, kept] * np.sqrt(values[kept])
+    return factor
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,10 +178,6 @@ class Outline:
             found.append(cls(eye, flat[mine], inverse[mine], ray))
             first += len(one.outline)
         return found
-
-
-_ANGLES = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
-_NORMALS = np.stack([np.cos(_ANGLES), np.sin(_ANGLES)], axis=1)
 
 
 def place(thing: Thing, outlines: Sequence[Outline], eyes: Eyes) -> Placed | None:

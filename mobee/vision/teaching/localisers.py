@@ -18,8 +18,7 @@ from mobee.arrays import Array
 from mobee.errors import NotInstalled, UnknownName
 from mobee.model.kinematics import link_transforms
 from mobee.vision.imperfections import CameraSettings
-from mobee.vision.lens import Lens
-from mobee.vision.mount import camera_frames
+from mobee.vision.lens import Lens, camera_frames
 from mobee.vision.rig import Rig
 from mobee.vision.stereo import nearest_to_rays
 from mobee.vision.teaching.cartesian_programs import CartesianPrograms

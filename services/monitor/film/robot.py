@@ -16,10 +16,9 @@ from mobee.model.pose import Pose
 from mobee.model.world import World
 from mobee.model.world_object import Geometry
 from mobee.rendering.camera import Camera, camera_axes, framing
-from mobee.rendering.link_solids import LinkSolid, link_solids
 from mobee.rendering.palette import Color
 from mobee.rendering.picture import draw
-from mobee.rendering.solid import Solid, focus, object_solids
+from mobee.rendering.solid import LinkSolid, Solid, focus, link_solids, object_solids
 from mobee.robot.robot import Robot
 from services.common.worlds import AT_TABLE
 from services.monitor.film.ink import GROUND, LEARNED, TEXT, WHITE, dot, mixed

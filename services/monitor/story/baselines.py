@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from bus_schema.messages import Learned
 from mobee.arrays import Array, Ints
-from mobee.learning.beliefs import PREDICTABLE_SHARE, PREDICTABLE_TRIES
 from mobee.learning.space import Space
+from mobee.learning.value_iteration import PREDICTABLE_SHARE, PREDICTABLE_TRIES
 from services.monitor.story.knowledge import Knowledge
 
 BASELINES = ("least_tried", "random")

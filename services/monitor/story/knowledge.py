@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from bus_schema.messages import Learned
 from mobee.arrays import Array, Ints
-from mobee.learning.beliefs import PREDICTABLE_SHARE, PREDICTABLE_TRIES
 from mobee.learning.neighbours import NO_ACTION
 from mobee.learning.space import Space
+from mobee.learning.value_iteration import PREDICTABLE_SHARE, PREDICTABLE_TRIES
 
 
 @dataclass(frozen=True, eq=False)

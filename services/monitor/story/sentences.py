@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 from bus_schema.messages import Decision, Playback, Reach, Transition
 from mobee.arrays import Array
-from mobee.learning.beliefs import LEAST_PROBABILITY, surprise_of
 from mobee.learning.space import Space
+from mobee.learning.value_iteration import LEAST_PROBABILITY, surprise_of
 from services.monitor.story.words import action_words, displacement, listed, ordinal, percent, title_of
 
 UNSURE = 0.05  # an outcome that is likelier than the goal by less is not expected

@@ -12,8 +12,8 @@ from msgspec.structs import replace
 
 from bus_schema.messages import Decision, Learned, Playback, Reach, Transition
 from mobee.arrays import Array
-from mobee.learning.beliefs import surprise_of
 from mobee.learning.space import Space
+from mobee.learning.value_iteration import surprise_of
 from mobee.rendering.palette import Color
 from mobee.robot.robot import Robot
 from services.monitor.story.baselines import Curve, baselines, outcomes_of

@@ -14,9 +14,8 @@ from mobee.model.kinematics import link_transforms, quaternion_from_matrix
 from mobee.model.model import Model
 from mobee.model.world import World
 from mobee.rendering import palette
-from mobee.rendering.link_solids import LinkSolid, link_solids
 from mobee.rendering.palette import Rgba
-from mobee.rendering.solid import Solid
+from mobee.rendering.solid import LinkSolid, Solid, link_solids
 from mobee.robot.robot import Robot, Shape, ShapeKind
 from mobee.robot.urdf.hull import facets
 from services.monitor.web.surfaces import flat

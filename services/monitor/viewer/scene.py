@@ -13,7 +13,7 @@ from bus_schema.rpc import ObjectState
 from mobee.arrays import Array
 from mobee.model.kinematics import link_transforms, matrix_from_quaternion, quaternion_from_matrix
 from mobee.rendering import palette
-from mobee.rendering.link_solids import link_solids
+from mobee.rendering.solid import link_solids
 from mobee.robot.robot import Robot, Shape
 from services.monitor.viewer.blueprint import ROOT
 from services.monitor.viewer.figure import drawn, drawn_link

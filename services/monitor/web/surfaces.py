@@ -12,9 +12,8 @@ from functools import cache
 import numpy as np
 
 from mobee.arrays import Array, Ints
-from mobee.rendering.link_solids import LinkSolid, coarser, link_solids
 from mobee.rendering.palette import Color
-from mobee.rendering.solid import Solid
+from mobee.rendering.solid import LinkSolid, Solid, coarser, link_solids
 from mobee.robot.robot import Robot
 from mobee.robot.urdf.hull import facets
 

@@ -8,8 +8,8 @@ import pytest
 
 from experiments.bench import scenes
 from experiments.bench.scenes import MAKERS, MIXED, OBJECTS, PLAIN, Maker, boxes_world, upper_body, upper_body_poses
+from mobee.model.engine import NO_HANDS
 from mobee.model.fcl_engine import tested_pairs as pairs_of
-from mobee.model.snapshot import NO_HANDS
 
 
 def test_the_upper_body_has_the_size_that_is_documented() -> None:

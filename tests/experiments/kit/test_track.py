@@ -15,9 +15,9 @@ from tensorboardX.proto.event_pb2 import Event, SessionLog
 
 from experiments.kit.track import FOLDER, track_stores, tracked
 from mobee import CuriousAgent, TransitionModel
-from mobee.learning.beliefs import probability_of
 from mobee.learning.discrete import DiscreteSpace
 from mobee.learning.tabular import TabularPlant, river_swim
+from mobee.learning.value_iteration import probability_of
 from mobee.store import STORE, Transition, TransitionStore
 from mobee_cli.__main__ import main
 from tests.mobee.learning.toys import InstantPlant, torso

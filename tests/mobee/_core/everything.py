@@ -16,11 +16,10 @@ import mobee
 from mobee._core.learning import gaussian_sums
 from mobee.learning.reaching.histories import Histories
 from mobee.learning.tabular import TabularPlant, half_space
-from mobee.rendering.room import clutter, room
-from mobee.rendering.scene import Scene
+from mobee.rendering.scene import Scene, clutter, room
 from mobee.roadmap.edges import check_edges
-from mobee.roadmap.ik.least_squares import Descent
 from mobee.roadmap.ik.problem import Problem
+from mobee.roadmap.ik.solve import Descent
 from mobee.robot.load import Robot
 from mobee.vision.exposure import Cameras
 from mobee.vision.imperfections import CameraSettings, camera_errors

@@ -11,7 +11,7 @@ import pytest
 
 from mobee.arrays import Array
 from mobee.behaviours.gaze import Gaze, gaze_motors
-from mobee.behaviours.target import TargetTrack
+from mobee.behaviours.tracking import TargetTrack
 from mobee.control import Gains
 from mobee.errors import InvalidValue
 from mobee.model.kinematics import link_transforms

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mobee.behaviours.hand import Hand
+from mobee.behaviours.grasp import Hand
 from mobee.errors import InvalidValue
 from mobee.model import World, sphere
 from mobee.model.model import Model

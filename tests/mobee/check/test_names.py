@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from mobee.check.interface import Subject
 from mobee.check.shapes import identical_shapes
-from mobee.check.subject import Subject
 from tests.mobee.check.arm import arm, named
 
 BALLS = '<sphere name="one" radius="0.01" py="{}"/><sphere name="two" radius="{}" py="0.01"/><marker'

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mobee.check import check_robot
-from mobee.check.units import half_extent
+from mobee.check.size_and_mass import half_extent
 from mobee.robot.robot import Shape
 from tests.mobee.check.arm import arm, named
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 
 import pytest
 
-from mobee.check.world import check_world
+from mobee.check.run import check_world
 from mobee.model import World, box, cylinder, sphere
 from mobee.model.world_file import load_world, shipped_worlds
 

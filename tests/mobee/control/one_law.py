@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from mobee._core import address
+from mobee._core import INTERVAL, address, view
 from mobee._core import law as core
-from mobee._core.tables import INTERVAL, view
 from mobee.arrays import Array
 
 

@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 
 from mobee.arrays import Array
 from mobee.control import Controller, Gains, constraint_forces
-from mobee.control.law import stack_clauses
-from mobee.control.stability import largest_step
+from mobee.control.law import largest_step, stack_clauses
 from mobee.model.model import Model
 from mobee.model.world_file import load_world
 from mobee.robot.load import load_robot

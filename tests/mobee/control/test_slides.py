@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 
 from mobee.arrays import Array
 from mobee.control.gains import Gains
-from mobee.control.law import Law
-from mobee.control.stability import largest_step
+from mobee.control.law import Law, largest_step
 from mobee.model.model import Model
 from mobee.robot.motor_units import SLIDE_RANGE
 from mobee.robot.robot import Clause, Robot

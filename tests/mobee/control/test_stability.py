@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mobee.control.gains import Gains
-from mobee.control.law import Law
-from mobee.control.stability import largest_step, require_stable
+from mobee.control.law import Law, largest_step, require_stable
 from mobee.errors import InvalidValue
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Clause, Robot

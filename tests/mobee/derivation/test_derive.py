@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mobee.derivation import derive
-from mobee.derivation.names import names_of
+from mobee.derivation.arms import names_of
 from mobee.errors import InvalidValue, Simplified, UnknownName
 from mobee.learning.agent import CuriousAgent, run
 from mobee.model.model import Model

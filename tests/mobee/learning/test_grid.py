@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mobee.errors import InvalidValue
-from mobee.learning.grid import Grid
+from mobee.learning.object_space import Grid
 
 GRID = Grid((-0.4, -0.1), (0.0, 0.4), (3, 2), margin=0.02)
 

@@ -12,8 +12,7 @@ from mobee.learning.agent import CuriousAgent
 from mobee.learning.discrete import DiscreteSpace
 from mobee.learning.lattice import Lattice
 from mobee.learning.record import load_learned, space_from
-from mobee.learning.space import Space
-from mobee.learning.voronoi import Voronoi
+from mobee.learning.space import Space, Voronoi
 from mobee.store import Transition, TransitionStore
 from tests.mobee.learning.toys import FickleDice, arm, torso, toy_robot
 

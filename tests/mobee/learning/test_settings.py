@@ -16,7 +16,7 @@ from mobee.errors import InvalidValue, UnknownName
 from mobee.learning.agent import CuriousAgent
 from mobee.learning.learner import CuriousSettings
 from mobee.learning.reaching.learner import ReachSettings
-from mobee.learning.reaching.predictors.nearest import Nearest
+from mobee.learning.reaching.predictors.local_averages import Nearest
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.transitions import TransitionModel, kl_divergence
 from mobee.simulation.plant import OfflinePlant, PlantSettings

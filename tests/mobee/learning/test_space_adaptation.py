@@ -7,7 +7,7 @@ import pytest
 import mobee
 from mobee import Space
 from mobee.learning.neighbours import edges_of
-from mobee.learning.space_adaptation import carried, pruned, with_shortcuts
+from mobee.learning.space import carried, pruned, with_shortcuts
 from mobee.store import Transition
 from tests.mobee.learning.toys import toy_robot
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from mobee.errors import InvalidValue
 from mobee.learning.agent import CuriousAgent
-from mobee.learning.voronoi import Voronoi
+from mobee.learning.space import Voronoi
 from tests.mobee.learning.toys import SHOULDER_ELBOW, InstantPlant, toy_robot
 
 JOINTS = [f"l_{name}" for name in SHOULDER_ELBOW]

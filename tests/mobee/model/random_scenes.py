@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 import mobee
 from mobee._core.narrow import Volumes, overlaps
 from mobee.arrays import Array, Ints
+from mobee.model.engine import NO_HANDS, Hands
 from mobee.model.fcl_engine import tested_pairs
 from mobee.model.kinematics import link_transforms
-from mobee.model.snapshot import NO_HANDS, Hands
 from mobee.model.world_object import Role, WorldObject
 from mobee.robot.robot import Joint, Motor, Part, Robot, Shape
 

@@ -9,8 +9,7 @@ import pytest
 import mobee
 from mobee._core.engine import span
 from mobee.model import engine as engines
-from mobee.model.engine import Engine
-from mobee.model.snapshot import NO_HANDS
+from mobee.model.engine import NO_HANDS, Engine
 from tests.mobee.model.random_scenes import loaded, posed, random_world
 
 Places = Callable[[np.random.Generator, int], np.ndarray]

@@ -5,7 +5,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mobee.model.robot_tables import _rows, clusters
+from mobee.model.core_tables import _rows, clusters
 from mobee.robot.robot import Robot
 from tests.mobee.model.random_scenes import loaded, random_robot
 

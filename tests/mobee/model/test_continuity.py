@@ -19,8 +19,8 @@ import pytest
 from experiments.bench.scenes import boxes_world, upper_body
 from mobee import Model
 from mobee.arrays import Array
+from mobee.model.core_tables import bound
 from mobee.model.pose import Pose
-from mobee.model.volumes import bound
 from mobee.model.world_object import WorldObject
 from mobee.robot.robot import Shape
 

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 import mobee
 from mobee.arrays import Array
 from mobee.errors import UnknownName
+from mobee.model.engine import MAX_HANDS, NO_HANDS, Hand, Hands
 from mobee.model.model import engine_of
-from mobee.model.snapshot import MAX_HANDS, NO_HANDS, Hand, Hands
 from mobee.robot.robot import Motor, Robot
 from tests.mobee.model.random_scenes import loaded, plain_contacts, posed, random_robot, random_world
 

@@ -6,9 +6,9 @@ import pytest
 
 from mobee._core.engine import swung
 from mobee.arrays import Array
+from mobee.model.core_tables import robot_tables
 from mobee.model.engine import robot_handle
 from mobee.model.kinematics import link_transforms
-from mobee.model.robot_tables import robot_tables
 from mobee.robot.robot import Robot
 from tests.mobee.model.random_scenes import Rng, posed, random_robot
 

@@ -5,9 +5,8 @@ import numpy as np
 import pytest
 
 from mobee._core import engine as core
+from mobee.model.core_tables import Carried, robot_tables, volume_row
 from mobee.model.kinematics import link_transforms
-from mobee.model.robot_tables import Carried, robot_tables
-from mobee.model.volumes import volume_row
 from mobee.robot.robot import Robot
 from tests.mobee.model.random_scenes import loaded, posed, random_robot, random_world, solids
 

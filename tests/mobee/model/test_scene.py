@@ -8,8 +8,7 @@ import pytest
 
 import mobee
 from mobee._core.engine import Grid, grid_of
-from mobee.model.engine import Engine
-from mobee.model.snapshot import OBSTACLE, TARGET
+from mobee.model.engine import OBSTACLE, TARGET, Engine
 from tests.mobee.model.random_scenes import loaded, random_world
 
 

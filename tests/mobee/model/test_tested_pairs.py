@@ -6,7 +6,7 @@ import pytest
 
 import mobee
 from mobee.model import fcl_engine as rules
-from mobee.model.snapshot import Hand
+from mobee.model.engine import Hand
 from mobee.model.world import World
 from mobee.robot.robot import Joint, Motor, Part, Robot, Shape
 

@@ -11,7 +11,7 @@ import pytest
 
 import mobee
 from mobee.errors import InvalidValue
-from mobee.model.snapshot import NO_HANDS
+from mobee.model.engine import NO_HANDS
 from tests.mobee.model.random_scenes import loaded, posed, random_world
 
 THREADS = 8

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
 import mobee
+from mobee.model.core_tables import VOLUME, volume_row
+from mobee.model.engine import ATTACHED, ATTACHED_GHOST, GHOST, OBSTACLE, TARGET
 from mobee.model.kinematics import matrix_from_quaternion
-from mobee.model.snapshot import ATTACHED, ATTACHED_GHOST, GHOST, OBSTACLE, TARGET
-from mobee.model.volumes import VOLUME, volume_row
 from tests.mobee.planar import planar_arm
 
 

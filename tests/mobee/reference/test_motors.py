@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mobee.arrays import Array
-from mobee.reference import motors as reference
+from mobee.reference import plant as reference
 from mobee.simulation import MotorParameters, Motors
 from tests.mobee.control.two_parts import two_part_arm
 from tests.mobee.reference.drawn import Rng, drawn_pose, drawn_robot

@@ -9,10 +9,8 @@ import pytest
 import mobee
 from mobee.errors import InvalidValue, UnknownName
 from mobee.model.world_object import sphere
-from mobee.rendering.link_solids import PALENESS, link_solids, robot_solids
-from mobee.rendering.motion import Motion, motion_through, recorded
-from mobee.rendering.sheet import Strip, cloud_solids, filmstrip, marker_cloud, panels
-from mobee.rendering.solid import object_solids, trail_solids
+from mobee.rendering.sheet import Motion, Strip, cloud_solids, filmstrip, marker_cloud, motion_through, panels, recorded
+from mobee.rendering.solid import PALENESS, link_solids, object_solids, robot_solids, trail_solids
 
 ARM = ["r_shoulder_pitch", "r_shoulder_roll", "r_shoulder_yaw", "r_elbow"]
 PALM = "right_palm"

@@ -14,11 +14,10 @@ from PIL import Image
 
 from mobee.errors import RobotFileError, Simplified
 from mobee.rendering.camera import NEAREST, Raster, eye_camera, pixel_middles
-from mobee.rendering.link_solids import coarser, link_solids
 from mobee.rendering.mesh import Piece, ellipsoid_piece, fair_most, mesh_of, read_pieces, smaller
-from mobee.rendering.solid import Solid
+from mobee.rendering.solid import Solid, coarser, link_solids
 from mobee.robot.load import load_robot
-from mobee.robot.visual import MeshSource
+from mobee.robot.robot import MeshSource
 from tests.mobee.rendering.test_raster import AHEAD, RED, SHAPES, camera, turn
 from tests.mobee.robot.urdf_files import ARM, urdf_file, write_stl
 

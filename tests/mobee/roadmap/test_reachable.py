@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mobee import InvalidValue, Model, UnknownName, load_robot
-from mobee.roadmap.reachable import body_at, nearest_outside, nearest_posture
+from mobee.roadmap.ik.solve import body_at, nearest_outside, nearest_posture
 from tests.mobee.planar import planar_arm
 
 ROBOT = load_robot("icub")

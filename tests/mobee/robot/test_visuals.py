@@ -13,10 +13,9 @@ import pytest
 from mobee.errors import Simplified
 from mobee.robot.join import join_robots
 from mobee.robot.load import load_robot
-from mobee.robot.robot import Robot
+from mobee.robot.robot import Robot, Visual
 from mobee.robot.urdf.mesh import first_file, mesh_places
-from mobee.robot.urdf.visuals import MOST_VISUALS
-from mobee.robot.visual import Visual
+from mobee.robot.urdf.shapes import MOST_VISUALS
 from mobee.robot.xml.write import write_xml
 from tests.mobee.robot.mjcf_files import mjcf_file
 from tests.mobee.robot.urdf_files import ARM, foreign, urdf_file, write_stl

@@ -4,7 +4,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mobee.reference.motors import normal
+from mobee.reference.plant import normal
 from mobee.robot.load import load_robot
 from mobee.simulation import MotorParameters, Motors
 

@@ -8,19 +8,17 @@ import numpy as np
 import pytest
 
 from mobee import InvalidValue, UnknownName, World, load_world, sphere
-from mobee.rendering.room import clutter, room
-from mobee.rendering.scene import Scene
-from mobee.vision.alignment import aligned
+from mobee.rendering.scene import Scene, clutter, room
 from mobee.vision.encoders import Moment, Readings, moment_at
 from mobee.vision.exposure import Cameras
 from mobee.vision.imperfections import CameraErrors, CameraSettings, camera_errors
 from mobee.vision.lens import DRAGONFLY
 from mobee.vision.objects.detectors import detector_of
-from mobee.vision.objects.eyes import eyes_at
 from mobee.vision.objects.locating import locate_all
+from mobee.vision.objects.placing import eyes_at
 from mobee.vision.objects.thing import things_in
 from mobee.vision.rig import see_tag
-from mobee.vision.tag import CELLS, FAMILY, NUMBER, Tag, find_tag, tag_solids
+from mobee.vision.tag import CELLS, FAMILY, NUMBER, Tag, aligned, find_tag, tag_solids
 from tests.mobee.vision.calibration.synthetic import MODEL, RIG, ROBOT, postures
 
 SETTINGS = CameraSettings(samples=4)

@@ -8,7 +8,7 @@ import pytest
 from scipy import ndimage
 from scipy.spatial import ConvexHull
 
-from mobee._core.regions import regions
+from mobee._core.vision import regions
 from mobee.vision.regions import border, boxes, label, without_holes
 
 

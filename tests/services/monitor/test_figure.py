@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from mobee.model import World, sphere
-from mobee.robot.robot import Robot
-from mobee.robot.visual import Visual
+from mobee.robot.robot import Robot, Visual
 from tests.mobee.check.arm import arm
 
 rr = pytest.importorskip("rerun")

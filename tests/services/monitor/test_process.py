@@ -28,7 +28,7 @@ from tests.services.stage import LOOKING_DOWN, Stage, posture
 
 rr = pytest.importorskip("rerun")
 from mobee.rendering import palette  # noqa: E402  # only where Rerun is
-from mobee.rendering.link_solids import BUDGET  # noqa: E402  # only where Rerun is
+from mobee.rendering.solid import BUDGET  # noqa: E402  # only where Rerun is
 from services.monitor.viewer.blueprint import blueprint, shown_of  # noqa: E402  # only where Rerun is
 from services.monitor.viewer.files import program  # noqa: E402  # only where Rerun is
 from services.monitor.viewer.plots import Plots  # noqa: E402  # only where Rerun is

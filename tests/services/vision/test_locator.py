@@ -31,15 +31,14 @@ from mobee import World, load_world, sphere
 from mobee.rendering.scene import Scene
 from mobee.robot.cameras import cameras_of
 from mobee.robot.load import load_robot
+from mobee.robot.robot import Camera as Camera3D
 from mobee.robot.robot import Robot
-from mobee.robot.visual import Camera as Camera3D
 from mobee.vision.ball import find_balls
 from mobee.vision.encoders import Moment
 from mobee.vision.lens import Lens
 from mobee.vision.objects.detectors import detector_of
-from mobee.vision.objects.eyes import eyes_at
 from mobee.vision.objects.locating import locate_all
-from mobee.vision.objects.placing import Placed
+from mobee.vision.objects.placing import Placed, eyes_at
 from mobee.vision.objects.thing import things_in
 from mobee.vision.rig import Rig
 from services.common.cameras import frame_at_capture

@@ -5,12 +5,9 @@ from collections.abc import Callable
 from functools import partial
 
 from mobee.learning.reaching.predictors.gaussian_process import GaussianProcess
-from mobee.learning.reaching.predictors.kernel import Kernel
-from mobee.learning.reaching.predictors.nearest import Nearest
+from mobee.learning.reaching.predictors.local_averages import Kernel, Nearest, Table, Weighted
 from mobee.learning.reaching.predictors.networks import Networks
 from mobee.learning.reaching.predictors.predictor import RewardPredictor
-from mobee.learning.reaching.predictors.table import Table
-from mobee.learning.reaching.predictors.weighted import Weighted
 from mobee.learning.reaching.reaches import Reaches
 
 __all__ = ["PREDICTORS", "PredictorOf", "Reaches", "RewardPredictor"]

@@ -4,6 +4,18 @@
 The covariance of the mean rewards of two reaches has four parts: for similar poses and near targets ("place"), for similar poses and
 similar vectors from hand to target ("approach"), for similar remaining distances in any poses ("distance"), and a small part for all
 reaches ("offset").
+
+`LinearArm` predicts the distance that remains after a reach, with springs at the joints and a force at the hand. In a state with the
+Jacobian J, a force proportional to the remaining error e turns the joints by g J^T e, against their springs. So for the vector w from hand
+to target, e = (I + g J J^T)^-1 w. The compliance g is one number for all states, fitted to the rewards.
+
+Reaches may be made in several worlds or on several robots, such as a simulated one; the similarity of the worlds is estimated from the
+rewards. The mean reward of a reach in an earlier world is its mean reward in the present world plus a difference. The differences of one
+world are a Gaussian process whose covariance function is that of the mean rewards, times a factor d. The differences of two worlds are
+independent. So the covariance of the mean rewards of two reaches is K in general, and (1 + d) K if both were made in the same earlier
+world. With d = 0 the rewards of that world count like those of the present one; the larger d is, the less the rewards of that world inform
+about the present one. (Kennedy and O'Hagan 2000 model fast and accurate simulations like this, with another covariance function of the
+differences.)
 """
 
 from __future__ import annotations
@@ -14,9 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mobee.arrays import Array, Ints
-from mobee.learning.reaching.predictors.linear_arm import LinearArm
-from mobee.learning.reaching.predictors.observed import Reached
-from mobee.learning.reaching.predictors.worlds import ONE_WORLD, scales_of
+from mobee.learning.reaching.predictors.predictor import Reached
 from mobee.learning.reaching.reaches import Reaches
 
 OFFSET = 0.3**2  # variance of the common part of all rewards
@@ -31,52 +41,20 @@ DEFAULTS = {  # variances of rewards, which are in [0, 1], and lengths in m
     "distance length": 0.10,
 }
 DEFAULT_JOINT = 0.5  # length scale of each joint, in units of the spread of the samples
-Slopes = Callable[[Array], Array]
 _NOISE, _PLACE, _PLACE_L, _APPROACH, _APPROACH_L, _APPROACH_J, _DISTANCE, _DISTANCE_L, _JOINTS = range(9)
+Slopes = Callable[[Array], Array]
 
+MAX_FITTED = 500  # pairs used in the fit: time grows with their cube
+PRIOR_DEVIATION = 1.0  # of the logarithm of a parameter around its default
+MAX_STEPS = 40  # of the search
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Points:
-    """The features of n reaches that the covariance function needs.
+COMPLIANCES = (0.0, 1.25, 2.5, 5.0, 10.0, 20.0, 40.0, 80.0, 160.0)  # rad/m^2, candidates of the fit
+DEFAULT_COMPLIANCE = 20.0  # rad/m^2, before the first fit
+SLOPE_WEIGHT = 1.0  # of slope 1 in the fit of the linear function, in reaches
 
-    `state`: (n,) number of the state in which each reach starts. `target`: (n, 3) m, root frame. `vector`: (n, 3) m, from the hand to the
-    target. `remaining`: (n,) m, the distance that remains after the reach, as `LinearArm` (a linear arm with springs) predicts it.
-    """
-
-    state: Ints
-    target: Array
-    vector: Array
-    remaining: Array
-
-
-def points(arm: LinearArm, state: Ints, target: Array) -> Points:
-    """Return the features of reaches from states (n,) for targets (n, 3) [m], or for one target (3,) [m], root frame.
-
-    `arm`: predicts the distances that remain after the reaches, and has the positions of the hand in the states.
-    """
-    targets = np.broadcast_to(target, (len(state), 3))
-    vector = targets - arm.reaches.hands[state]
-    return Points(state, targets, vector, arm.remaining(state, vector))
-
-
-def default_parameters(reaches: Reaches) -> Array:
-    """Return the logarithms of the covariance parameters before the first fit, shape (8 + d,).
-
-    First come the parameters in `DEFAULTS` (variances of rewards, and lengths in m), then one length for each joint, in units of the spread
-    of its samples (largest minus smallest).
-    """
-    return np.log([*DEFAULTS.values(), *[DEFAULT_JOINT] * reaches.samples.shape[1]])
-
-
-def joint_squares(reaches: Reaches) -> Array:
-    """Return for each joint the squared differences between the samples of all pairs of states, shape (d, S, S).
-
-    The sample of a state is the pose of the d joints at which its reaches begin. The positions of each joint are first divided by their
-    spread (largest minus smallest).
-    """
-    scaled = (reaches.samples / np.maximum(np.ptp(reaches.samples, axis=0), 1e-9)).T
-    squares: Array = (scaled[:, :, None] - scaled[:, None, :]) ** 2
-    return squares
+ONE_WORLD = np.zeros(1)
+"""The factors d if there is only the present world, (1,)."""
+FACTORS = (0.0, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0)  # values of d, equally probable before any reach
 
 
 class Covariance:
@@ -119,7 +97,7 @@ class Covariance:
         """Return the covariance (n, n) of the average rewards of n reaches, and a function that computes its derivatives.
 
         `a`: the reaches. `count`: (n,) number of tries over which the reward of each reach is averaged. `scales`: (n, n) factors on the
-        covariances of the mean rewards; 1, or more for two reaches in the same earlier world (`worlds.scales_of`). The function takes
+        covariances of the mean rewards; 1, or more for two reaches in the same earlier world (`scales_of`). The function takes
         weights (n, n). It returns the derivatives (8 + d,) of the sum of weights times covariance by the logarithms of the parameters.
         """
         value, pair = self._value, np.ix_(a.state, a.state)
@@ -155,34 +133,137 @@ class Covariance:
         return (place + approach + distance + OFFSET) * scales + np.diag(value[_NOISE] / count), slopes
 
 
-def _squared(a: Array, b: Array) -> Array:
-    """Return squared distances between rows, shape (a, b); exactly 0 for the same row."""
-    gap: Array = a[:, 0, None] - b[:, 0]
-    total = gap * gap
-    for axis in range(1, a.shape[1]):
-        gap = a[:, axis, None] - b[:, axis]
-        total += gap * gap
-    return total
+@dataclass(frozen=True, slots=True, eq=False)
+class Points:
+    """The features of n reaches that the covariance function needs.
 
-
-MAX_FITTED = 500  # pairs used in the fit: time grows with their cube
-PRIOR_DEVIATION = 1.0  # of the logarithm of a parameter around its default
-MAX_STEPS = 40  # of the search
-
-
-def fitted_pairs(reached: Reached) -> Ints:
-    """Return the indices, ascending, of the pairs of state and target that a fit uses: at most MAX_FITTED (500).
-
-    Pairs of the newest world (the surroundings and the robot of the newest reaches) are chosen first; pairs of all other worlds fill the
-    remaining number. If one of these two groups has too many pairs, evenly spaced ones are chosen from it, in the order of their first
-    reaches.
+    `state`: (n,) number of the state in which each reach starts. `target`: (n, 3) m, root frame. `vector`: (n, 3) m, from the hand to the
+    target. `remaining`: (n,) m, the distance that remains after the reach, as `LinearArm` (a linear arm with springs) predicts it.
     """
-    newest = reached.world == reached.world.max(initial=0)
-    chosen: list[Ints] = []
-    for group in (np.flatnonzero(newest), np.flatnonzero(~newest)):
-        number = min(len(group), MAX_FITTED - sum(map(len, chosen)))
-        chosen.append(group[np.unique(np.linspace(0, len(group) - 1, number).round().astype(np.intp))])
-    return np.sort(np.concatenate(chosen))
+
+    state: Ints
+    target: Array
+    vector: Array
+    remaining: Array
+
+
+def points(arm: LinearArm, state: Ints, target: Array) -> Points:
+    """Return the features of reaches from states (n,) for targets (n, 3) [m], or for one target (3,) [m], root frame.
+
+    `arm`: predicts the distances that remain after the reaches, and has the positions of the hand in the states.
+    """
+    targets = np.broadcast_to(target, (len(state), 3))
+    vector = targets - arm.reaches.hands[state]
+    return Points(state, targets, vector, arm.remaining(state, vector))
+
+
+class LinearArm:
+    """Predicts the reward of a reach from the distance that remains with a linear arm with springs.
+
+    The expected reward is offset + slope / (1 + distance / scale), where `scale` is that of the reaches (thesis eq. 8.4).
+
+    Args:
+        reaches: the reach actions: the marker's position and Jacobian in each state. Without Jacobians the arm does not move, and the whole
+            distance remains.
+        compliance: g of the springs, in rad/m^2: in a state with the Jacobian J, a remaining error e [m] turns the joints by g J^T e.
+        offset, slope: of the expected reward, see above.
+    """
+
+    def __init__(self, reaches: Reaches, compliance: float = DEFAULT_COMPLIANCE, offset: float = 0.0, slope: float = 1.0) -> None:
+        self.reaches, self.compliance, self.offset, self.slope = reaches, compliance, offset, slope
+        joints = np.zeros((len(reaches), 3, 1)) if reaches.jacobians is None else reaches.jacobians
+        squares: Array = joints @ np.swapaxes(joints, 1, 2)
+        self._shares: Array = np.asarray(np.linalg.inv(np.eye(3) + compliance * squares), dtype=np.float64)
+
+    def remaining(self, state: Ints, vector: Array) -> Array:
+        """Return the distances [m] that remain after reaches from states (n,), shape (n,). `vector`: (n, 3) m, from hand to target."""
+        remaining = np.einsum("nij,nj->ni", self._shares[state], vector)
+        length: Array = np.sqrt((remaining**2).sum(axis=1))
+        return length
+
+    def rewards(self, state: Ints, target: Array) -> Array:
+        """Return the expected rewards of reaches from states (n,) for targets (n, 3) m, or for one target (3,) m, shape (n,)."""
+        expected: Array = self.offset + self.slope * self._own(state, target)
+        return expected
+
+    def fitted(self, known: Reached) -> LinearArm:
+        """Return a new arm with the compliance, offset and slope that fit the observed rewards best (least squares).
+
+        `known`: the reaches observed so far; the arm is fitted to the average reward of each pair of state and target. The compliance is
+        one of COMPLIANCES; the slope has a weak prior of 1, and is at least 0.
+        """
+        target = known.places[known.target]
+        return min((self._with(compliance, known, target) for compliance in COMPLIANCES), key=lambda found: found[0])[1]
+
+    def _with(self, compliance: float, known: Reached, target: Array) -> tuple[float, LinearArm]:
+        arm = LinearArm(self.reaches, compliance)
+        own = arm._own(known.state, target)
+        middle, mean = float(own.mean()), float(known.mean.mean())
+        gap, error = own - middle, known.mean - mean
+        arm.slope = max(
+            float(gap @ error + SLOPE_WEIGHT * own @ own / len(own)) / float(gap @ gap + SLOPE_WEIGHT * own @ own / len(own)), 0.0
+        )
+        arm.offset = mean - arm.slope * middle
+        return float(((known.mean - arm.offset - arm.slope * own) ** 2).sum()), arm
+
+    def _own(self, state: Ints, target: Array) -> Array:
+        """Return the rewards of the arm, before the linear function (thesis eq. 8.4)."""
+        rewards: Array = 1.0 / (1.0 + self.remaining(state, target - self.reaches.hands[state]) / self.reaches.scale)
+        return rewards
+
+
+def default_parameters(reaches: Reaches) -> Array:
+    """Return the logarithms of the covariance parameters before the first fit, shape (8 + d,).
+
+    First come the parameters in `DEFAULTS` (variances of rewards, and lengths in m), then one length for each joint, in units of the spread
+    of its samples (largest minus smallest).
+    """
+    return np.log([*DEFAULTS.values(), *[DEFAULT_JOINT] * reaches.samples.shape[1]])
+
+
+def joint_squares(reaches: Reaches) -> Array:
+    """Return for each joint the squared differences between the samples of all pairs of states, shape (d, S, S).
+
+    The sample of a state is the pose of the d joints at which its reaches begin. The positions of each joint are first divided by their
+    spread (largest minus smallest).
+    """
+    scaled = (reaches.samples / np.maximum(np.ptp(reaches.samples, axis=0), 1e-9)).T
+    squares: Array = (scaled[:, :, None] - scaled[:, None, :]) ** 2
+    return squares
+
+
+def scales_of(world: Ints, factors: Array) -> Array:
+    """Return the numbers (n, n) by which the covariances K of the mean rewards of n reaches are multiplied.
+
+    `world`: (n,) the index of the world of each reach. `factors`: (W,) for each world the factor d of its differences from the present
+    world, see the module; 0 for the present one.
+    """
+    scales: Array = 1.0 + factors[world] * (world[:, None] == world)
+    return scales
+
+
+def fitted_parameters(logs: Array, arm: LinearArm, squares: Array, reached: Reached, expected: Array, factors: Array = ONE_WORLD) -> Array:
+    """Return the logarithms of the covariance parameters with the highest posterior, (8 + d,), by a local search.
+
+    `logs`: (8 + d,), where the search begins, for d joints. `arm`: gives the features of the reaches (`points`). `squares`: (d, S, S) for S
+    states, from `joint_squares`. `reached`: the n pairs of state and target that were tried, with their rewards. `expected`: (n,) prior
+    mean reward of each pair. `factors`: (W,) for each of W worlds (in which reaches were made) how much its rewards differ from those of
+    the present one, 0: not at all; see `scales_of`.
+    """
+    from scipy.optimize import minimize
+
+    bounds = [(middle - 4.0 * PRIOR_DEVIATION, middle + 4.0 * PRIOR_DEVIATION) for middle in default_parameters(arm.reaches)]
+    found = minimize(
+        negative_log_posterior,
+        logs,
+        (arm, squares, reached, expected, factors),
+        jac=True,
+        method="L-BFGS-B",
+        bounds=bounds,
+        options={"maxiter": MAX_STEPS},
+    )
+    best: Array = found.x
+    return best
 
 
 def negative_log_posterior(
@@ -201,7 +282,7 @@ def negative_log_posterior(
         reached: the n pairs of state and target that were tried, with their rewards.
         expected: (n,) prior mean reward of each pair.
         factors: (W,) for each of W worlds (in which reaches were made) how much its rewards differ from those of the present one, 0: not at
-            all; see `worlds.scales_of`.
+            all; see `scales_of`.
     """
     from scipy.linalg import cho_factor, cho_solve
 
@@ -222,25 +303,60 @@ def negative_log_posterior(
     return float(value), slope
 
 
-def fitted_parameters(logs: Array, arm: LinearArm, squares: Array, reached: Reached, expected: Array, factors: Array = ONE_WORLD) -> Array:
-    """Return the logarithms of the covariance parameters with the highest posterior, (8 + d,), by a local search.
+def fitted_pairs(reached: Reached) -> Ints:
+    """Return the indices, ascending, of the pairs of state and target that a fit uses: at most MAX_FITTED (500).
 
-    `logs`: (8 + d,), where the search begins, for d joints. `arm`: gives the features of the reaches (`points`). `squares`: (d, S, S) for S
-    states, from `joint_squares`. `reached`: the n pairs of state and target that were tried, with their rewards. `expected`: (n,) prior
-    mean reward of each pair. `factors`: (W,) for each of W worlds (in which reaches were made) how much its rewards differ from those of
-    the present one, 0: not at all; see `worlds.scales_of`.
+    Pairs of the newest world (the surroundings and the robot of the newest reaches) are chosen first; pairs of all other worlds fill the
+    remaining number. If one of these two groups has too many pairs, evenly spaced ones are chosen from it, in the order of their first
+    reaches.
     """
-    from scipy.optimize import minimize
+    newest = reached.world == reached.world.max(initial=0)
+    chosen: list[Ints] = []
+    for group in (np.flatnonzero(newest), np.flatnonzero(~newest)):
+        number = min(len(group), MAX_FITTED - sum(map(len, chosen)))
+        chosen.append(group[np.unique(np.linspace(0, len(group) - 1, number).round().astype(np.intp))])
+    return np.sort(np.concatenate(chosen))
 
-    bounds = [(middle - 4.0 * PRIOR_DEVIATION, middle + 4.0 * PRIOR_DEVIATION) for middle in default_parameters(arm.reaches)]
-    found = minimize(
-        negative_log_posterior,
-        logs,
-        (arm, squares, reached, expected, factors),
-        jac=True,
-        method="L-BFGS-B",
-        bounds=bounds,
-        options={"maxiter": MAX_STEPS},
-    )
-    best: Array = found.x
-    return best
+
+def fitted_factors(between: Array, noise: Array, residual: Array, world: Ints, factors: Array) -> Array:
+    """Return the factors (W,) with the largest evidence (marginal likelihood) of the rewards, by a local search over FACTORS.
+
+    A factor d describes how much a world differs from the present one, see the module.
+
+    Args:
+        between: (n, n) covariances K of the mean rewards of n pairs of state and target.
+        noise: (n,) variance of the average reward of each pair around its mean.
+        residual: (n,) average reward of each pair, minus its prior mean.
+        world: (n,) index of the world of each pair, 0 to W - 1.
+        factors: (W,) where the search begins, values in FACTORS. The last world is the present one: its factor stays 0.
+    """
+    from scipy.linalg import cho_factor, cho_solve
+
+    known: dict[tuple[float, ...], float] = {}
+
+    def evidence(trial: tuple[float, ...]) -> float:
+        if trial not in known:
+            matrix = between * scales_of(world, np.array(trial)) + np.diag(noise)
+            factor = cho_factor(matrix, lower=True, overwrite_a=True, check_finite=False)
+            known[trial] = -0.5 * residual @ cho_solve(factor, residual, check_finite=False) - np.log(factor[0].diagonal()).sum()
+        return known[trial]
+
+    best: tuple[float, ...] = tuple(factors.tolist())
+    before: tuple[float, ...] = ()
+    while best != before:
+        before = best
+        for number in np.unique(world[world < len(factors) - 1]).tolist():
+            at = FACTORS.index(best[number])
+            near = [(*best[:number], factor, *best[number + 1 :]) for factor in FACTORS[max(at - 1, 0) : at + 2]]
+            best = max(near, key=evidence)
+    return np.array(best)
+
+
+def _squared(a: Array, b: Array) -> Array:
+    """Return squared distances between rows, shape (a, b); exactly 0 for the same row."""
+    gap: Array = a[:, 0, None] - b[:, 0]
+    total = gap * gap
+    for axis in range(1, a.shape[1]):
+        gap = a[:, axis, None] - b[:, axis]
+        total += gap * gap
+    return total

@@ -15,17 +15,19 @@ import numpy as np
 from mobee.arrays import Array, Ints
 from mobee.learning.reaching.histories import forget
 from mobee.learning.reaching.predictors.covariance import (
+    ONE_WORLD,
     Covariance,
+    LinearArm,
     Points,
     default_parameters,
+    fitted_factors,
     fitted_pairs,
     fitted_parameters,
     joint_squares,
     points,
+    scales_of,
 )
-from mobee.learning.reaching.predictors.linear_arm import LinearArm
-from mobee.learning.reaching.predictors.observed import Reached
-from mobee.learning.reaching.predictors.worlds import ONE_WORLD, fitted_factors, scales_of
+from mobee.learning.reaching.predictors.predictor import Reached
 from mobee.learning.reaching.reaches import Reaches
 
 BLOCK = 32  # rows

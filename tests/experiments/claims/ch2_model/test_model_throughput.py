@@ -23,7 +23,7 @@ from experiments.claims.ch2_model.model_throughput_endurance import (
 )
 from experiments.claims.ch2_model.model_throughput_threads import Oscillator
 from experiments.kit.records import read_records
-from mobee.model.snapshot import changed
+from mobee.model.engine import changed
 from tests.experiments.options import options_of
 
 

@@ -8,8 +8,7 @@ from mobee.learning.reaching.changes import RewardScale, RunLength
 from mobee.learning.reaching.failures import MAX_COST, FailuresSinceChange, failures_of
 from mobee.learning.reaching.predictors import Reaches
 from mobee.learning.reaching.store import ReachStore
-from mobee.learning.reaching.tabular import ReachTable
-from mobee.learning.tabular import ideal
+from mobee.learning.tabular import ReachTable, ideal
 from mobee.learning.transitions import TransitionModel
 from mobee.reach import TARGET
 from tests.mobee.learning.reaching.toy import HANDS, PLACES, SPACE, TARGETS, agent, world

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mobee.learning.reaching.planning import ReachPlanning
+from mobee.learning.reaching.reaches import ReachPlanning
 from mobee.learning.tabular import TabularPlant, half_space, ideal
 from mobee.learning.transitions import TransitionModel
 from tests.mobee.learning.toys import arm

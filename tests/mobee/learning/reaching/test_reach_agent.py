@@ -5,12 +5,10 @@ import numpy as np
 import pytest
 
 from mobee.errors import ActionInterrupted, InvalidValue, MobeeError, UnknownName
-from mobee.learning.grid import Grid
-from mobee.learning.object_space import ObjectSpace
+from mobee.learning.object_space import Grid, ObjectSpace
 from mobee.learning.reaching.reach_agent import ReachAgent
 from mobee.learning.reaching.store import ReachStore
-from mobee.learning.reaching.tabular import ReachTable
-from mobee.learning.tabular import ideal
+from mobee.learning.tabular import ReachTable, ideal
 from mobee.learning.transitions import TransitionModel
 from mobee.plant import Outcome
 from mobee.reach import ReachTarget, reward_of

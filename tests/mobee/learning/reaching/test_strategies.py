@@ -6,7 +6,7 @@ import pytest
 
 from mobee.errors import InvalidValue
 from mobee.learning.reaching.predictors import PREDICTORS, Reaches
-from mobee.learning.reaching.predictors.table import Table
+from mobee.learning.reaching.predictors.local_averages import Table
 from mobee.learning.reaching.strategies import OPTIMISM, RANDOM_SHARE, STRATEGIES, WINDOW, Progress
 
 REACHES = Reaches(np.zeros((4, 2)), np.zeros((4, 3)))

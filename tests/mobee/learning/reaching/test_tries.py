@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from mobee.errors import InvalidValue
-from mobee.learning.reaching.planning import REACH
-from mobee.learning.reaching.tries import Problems, Step, made_of
+from mobee.learning.reaching.reaches import REACH
+from mobee.learning.reaching.store import Problems, Step, made_of
 from mobee.reach import ReachTarget
 
 MOVE = Step(

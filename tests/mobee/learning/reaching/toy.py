@@ -6,8 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from mobee.learning.reaching.reach_agent import ReachAgent
-from mobee.learning.reaching.tabular import ReachTable
-from mobee.learning.tabular import ideal
+from mobee.learning.tabular import ReachTable, ideal
 from mobee.reach import ReachTarget
 from tests.mobee.learning.toys import arm
 

@@ -6,7 +6,7 @@ import pytest
 
 import mobee
 from mobee import AdaptiveRoadmap, Lattice, Planner
-from mobee.roadmap.adaptive.edge_beliefs import PRIOR, EdgeBeliefs
+from mobee.roadmap.adaptive.adaptive import PRIOR, EdgeBeliefs
 from tests.mobee.roadmap.toy_map import JOINTS, ROBOT, SQUARE, random_map, square
 
 GOAL = 7

@@ -7,7 +7,7 @@ import pytest
 import mobee
 from mobee import Roadmap
 from mobee.learning.record import space_from
-from mobee.roadmap.adaptive.edge_beliefs import roadmap_space
+from mobee.roadmap.adaptive.adaptive import roadmap_space
 from tests.mobee.planar import planar_arm
 
 Q = np.array([[0.0, 0.1, 0.4], [0.5, 0.1, 0.4], [0.5, 0.6, 0.4], [2.0, 0.0, 0.4], [2.0, 0.5, 0.4], [0.5, 0.1, 0.4]])

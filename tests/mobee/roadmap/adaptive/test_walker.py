@@ -5,9 +5,8 @@ import numpy as np
 import pytest
 
 import mobee
-from mobee.roadmap.adaptive.explorer import MapExplorer
 from mobee.roadmap.adaptive.record import MapStore
-from mobee.roadmap.adaptive.walker import Walker
+from mobee.roadmap.adaptive.walker import MapExplorer, Walker
 from tests.mobee.roadmap.toy_map import JOINTS, ROBOT, SQUARE, BlockedPlant, random_map, square, wall
 
 A, B, C, D = SQUARE

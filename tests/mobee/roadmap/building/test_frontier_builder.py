@@ -11,7 +11,7 @@ from mobee import MobeeError
 from mobee.roadmap.building import search_scheduler
 from mobee.roadmap.building.frontier import MIN_DISTANCE
 from mobee.roadmap.building.frontier_builder import FrontierBuilder
-from mobee.roadmap.building.settings import SearchSettings
+from mobee.roadmap.building.search_scheduler import SearchSettings
 from tests.mobee.roadmap.toy import Level
 
 

@@ -9,8 +9,8 @@ from mobee import tasks
 from mobee.errors import InvalidValue, UnknownName
 from mobee.roadmap.building.tasks import Task
 from mobee.roadmap.ik import costs
-from mobee.roadmap.ik.least_squares import Descent
 from mobee.roadmap.ik.problem import Problem
+from mobee.roadmap.ik.solve import Descent
 
 MARKER = "right_palm"
 BOX = [(-0.5, -0.2), (-0.2, 0.4)]

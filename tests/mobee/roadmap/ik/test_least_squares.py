@@ -9,8 +9,8 @@ import pytest
 import mobee
 from mobee.errors import InvalidValue
 from mobee.roadmap.ik import costs
-from mobee.roadmap.ik.least_squares import Descent, aim_reals, least_squares
 from mobee.roadmap.ik.problem import Problem, needed
+from mobee.roadmap.ik.solve import Descent, aim_reals, least_squares
 from mobee.roadmap.ik.terms import level
 
 PALMS = "left_palm", "right_palm"

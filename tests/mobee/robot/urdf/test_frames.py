@@ -5,7 +5,7 @@ import numpy as np
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from mobee.robot.urdf.frames import rotation_of, rpy_of
+from mobee.robot.urdf.tree import rotation_of, rpy_of
 
 angle = st.floats(-7.0, 7.0)
 

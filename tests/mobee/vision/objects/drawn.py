@@ -8,10 +8,8 @@ from scipy.spatial import ConvexHull
 
 from mobee.vision.lens import DRAGONFLY
 from mobee.vision.objects.detection import Detection
-from mobee.vision.objects.eyes import Eye, Eyes
-from mobee.vision.objects.placing import Placed
-from mobee.vision.objects.silhouette import surface, touching, upright
-from mobee.vision.objects.thing import Thing
+from mobee.vision.objects.placing import Eye, Eyes, Placed
+from mobee.vision.objects.thing import Thing, surface, touching, upright
 
 BALL = Thing("ball", "sphere", (0.03,), (0.9, 0.05, 0.05))
 CUP = Thing("cup", "cylinder", (0.035, 0.09), (0.05, 0.3, 0.85))

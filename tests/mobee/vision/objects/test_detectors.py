@@ -7,15 +7,14 @@ import numpy as np
 import pytest
 
 from mobee import InvalidValue, UnknownName, World, capsule, load_world, sphere
-from mobee.rendering.room import clutter, room
-from mobee.rendering.scene import Scene
+from mobee.rendering.scene import Scene, clutter, room
 from mobee.vision.encoders import Moment
 from mobee.vision.exposure import Cameras
 from mobee.vision.imperfections import CameraErrors, CameraSettings
 from mobee.vision.objects.detection import Detection
 from mobee.vision.objects.detectors import detector_of
-from mobee.vision.objects.eyes import eyes_at
 from mobee.vision.objects.locating import locate_all
+from mobee.vision.objects.placing import eyes_at
 from mobee.vision.objects.thing import Thing, things_in
 from tests.mobee.vision.calibration.synthetic import RIG, ROBOT
 from tests.mobee.vision.objects.drawn import THINGS

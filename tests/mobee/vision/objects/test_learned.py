@@ -11,14 +11,13 @@ import onnx
 import pytest
 
 from mobee import InvalidValue, load_world
-from mobee.rendering.room import clutter, room
-from mobee.rendering.scene import Scene
+from mobee.rendering.scene import Scene, clutter, room
 from mobee.vision.exposure import Cameras
 from mobee.vision.imperfections import CameraErrors, CameraSettings
+from mobee.vision.objects.detection import outlined
 from mobee.vision.objects.detectors import detector_of, require_detector
 from mobee.vision.objects.learned.network import KEY, Network, load_network, network_of
 from mobee.vision.objects.learned.training import HIDDEN, surroundings, train
-from mobee.vision.objects.outlining import outlined
 from services.vision.config import Config
 from tests.mobee.vision.calibration.synthetic import RIG, ROBOT
 from tests.mobee.vision.objects.drawn import BALL, THINGS

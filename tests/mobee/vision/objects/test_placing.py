@@ -12,14 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mobee import World, box
-from mobee.vision.mount import rotation_of
+from mobee.vision.lens import rotation_of
 from mobee.vision.objects.detection import Detection
-from mobee.vision.objects.eyes import Eye, Eyes
 from mobee.vision.objects.locating import locate_all
-from mobee.vision.objects.placing import EDGE, Outline, Placed
+from mobee.vision.objects.placing import EDGE, Eye, Eyes, Outline, Placed
 from mobee.vision.objects.placing import place as place_outlines
-from mobee.vision.objects.silhouette import surface, touching, upright
-from mobee.vision.objects.thing import Thing
+from mobee.vision.objects.thing import Thing, surface, touching, upright
 from tests.mobee.vision.objects.drawn import BALL, BOX, CUP, THINGS, eyes, seen
 
 PLACES = st.tuples(st.floats(-0.45, -0.25), st.floats(-0.12, 0.12), st.floats(-0.06, 0.06)).map(np.array)

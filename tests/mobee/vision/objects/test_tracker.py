@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 from mobee import InvalidValue
 from mobee.vision.objects.placing import Placed
 from mobee.vision.objects.thing import Thing
-from mobee.vision.objects.track import Track, TrackSettings
-from mobee.vision.objects.tracker import Tracker
+from mobee.vision.objects.track import Track, Tracker, TrackSettings
 from tests.mobee.vision.objects.drawn import BALL, BOX, CUP, THINGS, placed
 
 RATE = 15.0  # Hz

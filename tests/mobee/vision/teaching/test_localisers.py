@@ -11,7 +11,7 @@ from mobee.model.kinematics import link_transforms
 from mobee.robot.cameras import cameras_of
 from mobee.robot.load import load_robot
 from mobee.vision.imperfections import CameraSettings, camera_errors
-from mobee.vision.mount import camera_frames, into
+from mobee.vision.lens import camera_frames, into
 from mobee.vision.rig import Rig
 from mobee.vision.teaching.cartesian_programs import CartesianPrograms
 from mobee.vision.teaching.lessons import seeing_motors

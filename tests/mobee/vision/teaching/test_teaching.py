@@ -14,10 +14,8 @@ from mobee.robot.cameras import cameras_of
 from mobee.vision.calibration.offline import Watcher
 from mobee.vision.imperfections import CameraErrors, CameraSettings
 from mobee.vision.rig import Rig
-from mobee.vision.teaching.lessons import Lessons, seeing_motors, split_by_pose
+from mobee.vision.teaching.lessons import Lessons, gaze_postures, seeing_motors, split_by_pose, teacher_postures, watch_teacher
 from mobee.vision.teaching.localisers import stereo_places
-from mobee.vision.teaching.offline import watch_teacher
-from mobee.vision.teaching.postures import gaze_postures, teacher_postures
 
 SETTINGS = CameraSettings(samples=1)
 RIG = Rig(two_robots(), cameras_of(two_robots()), SETTINGS.lens)
@@ -43,7 +41,7 @@ def test_the_katana_holds_the_ball_in_the_volume_and_the_icub_sees_it_without_co
 
 
 def test_a_volume_out_of_reach_is_refused(model, monkeypatch):
-    monkeypatch.setattr("mobee.vision.teaching.postures.ROUNDS", 1)
+    monkeypatch.setattr("mobee.vision.teaching.lessons.ROUNDS", 1)
     with pytest.raises(InvalidValue, match="larger volume"):
         teacher_postures(RIG, model, BALL, watching(), (LOW + 3.0, HIGH + 3.0), 1, seed=0)
 

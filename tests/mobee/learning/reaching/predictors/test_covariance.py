@@ -7,6 +7,7 @@ import pytest
 from mobee.learning.reaching.predictors import covariance as evidence
 from mobee.learning.reaching.predictors.covariance import (
     Covariance,
+    LinearArm,
     default_parameters,
     fitted_pairs,
     fitted_parameters,
@@ -14,8 +15,7 @@ from mobee.learning.reaching.predictors.covariance import (
     negative_log_posterior,
     points,
 )
-from mobee.learning.reaching.predictors.linear_arm import LinearArm
-from mobee.learning.reaching.predictors.observed import Reached
+from mobee.learning.reaching.predictors.predictor import Reached
 from tests.mobee.learning.reaching.predictors.arms import drawn, reaches
 
 

@@ -5,11 +5,9 @@ import numpy as np
 import pytest
 
 from mobee.learning.reaching.predictors import gaussian_process
-from mobee.learning.reaching.predictors.covariance import Covariance, default_parameters, joint_squares, points
+from mobee.learning.reaching.predictors.covariance import Covariance, LinearArm, default_parameters, joint_squares, points, scales_of
 from mobee.learning.reaching.predictors.gaussian_process import BLOCK, GaussianProcess, thinned
-from mobee.learning.reaching.predictors.linear_arm import LinearArm
-from mobee.learning.reaching.predictors.observed import Reached
-from mobee.learning.reaching.predictors.worlds import scales_of
+from mobee.learning.reaching.predictors.predictor import Reached
 from tests.mobee.learning.reaching.predictors.arms import FAR, drawn, places, reaches, taught
 
 

@@ -3,9 +3,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from mobee.learning.reaching.predictors.kernel import JOINTS, PLACES, PRIOR_WEIGHT, Kernel
-from mobee.learning.reaching.predictors.observed import EXPECTED, Reached, around
-from mobee.learning.reaching.predictors.observed import IMAGINED as PAIRS
+from mobee.learning.reaching.predictors.local_averages import JOINTS, PLACES, PRIOR_WEIGHT, Kernel
+from mobee.learning.reaching.predictors.predictor import EXPECTED, Reached, around
+from mobee.learning.reaching.predictors.predictor import IMAGINED as PAIRS
 from tests.mobee.learning.reaching.predictors.arms import drawn, places, reaches, taught
 
 TRIES = 22  # the scales were chosen just then

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mobee.learning.reaching.predictors.linear_arm import COMPLIANCES, LinearArm
-from mobee.learning.reaching.predictors.observed import Reached
+from mobee.learning.reaching.predictors.covariance import COMPLIANCES, LinearArm
+from mobee.learning.reaching.predictors.predictor import Reached
 from tests.mobee.learning.reaching.predictors.arms import places, reaches
 
 ALL = np.arange(12)

@@ -3,8 +3,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mobee.learning.reaching.predictors.nearest import HALF_WEIGHT, JOINT_WEIGHT, LENGTH_SCALE, NEIGHBOURS, PRIOR_WEIGHT, Nearest
-from mobee.learning.reaching.predictors.observed import Reached, around
+from mobee.learning.reaching.predictors.local_averages import AVERAGE_WEIGHT, HALF_WEIGHT, JOINT_WEIGHT, LENGTH_SCALE, NEIGHBOURS, Nearest
+from mobee.learning.reaching.predictors.predictor import Reached, around
 from tests.mobee.learning.reaching.predictors.arms import drawn, places, reaches, taught
 
 
@@ -22,8 +22,8 @@ def test_the_mean_is_that_of_the_five_nearest_of_all_pairs():
                 pairs.append((((scaled[state] - scaled[other]) ** 2).sum() + way @ way / LENGTH_SCALE**2, reward))
             best = sorted(pairs)[:NEIGHBOURS]
             weights = [1.0 / (far + HALF_WEIGHT) for far, _ in best]
-            total = PRIOR_WEIGHT * middle + sum(w * reward for w, (_, reward) in zip(weights, best, strict=True))
-            np.testing.assert_allclose(nearest.mean(target)[state], total / (PRIOR_WEIGHT + sum(weights)), rtol=1e-9)
+            total = AVERAGE_WEIGHT * middle + sum(w * reward for w, (_, reward) in zip(weights, best, strict=True))
+            np.testing.assert_allclose(nearest.mean(target)[state], total / (AVERAGE_WEIGHT + sum(weights)), rtol=1e-9)
 
 
 def test_neighbours_of_a_target_are_the_same_with_and_without_earlier_queries():

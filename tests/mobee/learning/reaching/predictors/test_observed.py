@@ -4,7 +4,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mobee.learning.reaching.predictors.observed import EXPECTED, SPREAD, Reached, around
+from mobee.learning.reaching.predictors.predictor import EXPECTED, SPREAD, Reached, around
 
 HERE, THERE, NOWHERE = np.array([0.1, 0.2, 0.3]), np.array([0.1, 0.2, 0.4]), np.zeros(3)
 

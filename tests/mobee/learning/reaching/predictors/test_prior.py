@@ -3,8 +3,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mobee.learning.reaching.predictors.observed import EXPECTED, Reached
-from mobee.learning.reaching.predictors.predictor import KNOTS, DistancePrior, lengths
+from mobee.learning.reaching.predictors.predictor import EXPECTED, KNOTS, DistancePrior, Reached, lengths
 from tests.mobee.learning.reaching.predictors.arms import FAR, places, reaches
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mobee.learning.reaching.predictors.worlds import FACTORS, fitted_factors, scales_of
+from mobee.learning.reaching.predictors.covariance import FACTORS, fitted_factors, scales_of
 
 
 def test_only_two_reaches_in_the_same_earlier_world_share_its_differences():
