@@ -18,8 +18,7 @@ from mobee.model.model import Model
 from mobee.robot.cameras import cameras_of
 from mobee.robot.robot import Robot
 from mobee.vision.calibration.calibration import Calibration, Quality, Unobservable
-from mobee.vision.calibration.offline import Watcher, watch_hand
-from mobee.vision.calibration.postures import choose_postures
+from mobee.vision.calibration.observing import Watcher, choose_postures, watch_hand
 from mobee.vision.calibration.solve import calibrate
 from mobee.vision.imperfections import CameraSettings, camera_errors
 from mobee.vision.rig import AXES, Rig

@@ -23,8 +23,7 @@ from mobee.model.model import Model
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
 from mobee.vision.calibration.calibration import Calibration, Observation
-from mobee.vision.calibration.offline import MOVING, RESTING, moved_parts
-from mobee.vision.calibration.postures import choose_postures
+from mobee.vision.calibration.observing import MOVING, RESTING, choose_postures, moved_parts
 from mobee.vision.calibration.solve import calibrate
 from mobee.vision.encoders import Moment
 from mobee.vision.imperfections import CameraSettings

@@ -15,8 +15,7 @@ from mobee.errors import MobeeError, NotInstalled
 from mobee.vision.objects.detection import by_color
 from mobee.vision.objects.detectors import by_network
 from mobee.vision.objects.learned.network import SUFFIX, Network
-from mobee.vision.objects.learned.pictures import Quality, judge
-from mobee.vision.objects.learned.training import PICTURES, held_out, train
+from mobee.vision.objects.learned.training import PICTURES, Quality, held_out, judge, train
 from mobee.vision.objects.thing import things_in
 from mobee_cli.errors import UserError
 from mobee_cli.robot_options import DEFAULT, add_urdf_options, robot_given, world_given

@@ -15,8 +15,7 @@ from mobee.errors import InvalidValue
 from mobee.rendering.scene import Picture, Scene
 from mobee.robot.robot import Robot
 from mobee.vision.encoders import Readings
-from mobee.vision.exposure import Cameras
-from mobee.vision.imperfections import CameraErrors, CameraSettings
+from mobee.vision.imperfections import CameraErrors, Cameras, CameraSettings
 from services.common.service import Service
 
 TRUTHS = 128  # messages that are kept

@@ -20,8 +20,7 @@ from mobee.vision.encoders import Moment
 from mobee.vision.imperfections import CameraSettings
 from mobee.vision.lens import Lens
 from mobee.vision.objects.detectors import detector_of
-from mobee.vision.objects.locating import locate_all
-from mobee.vision.objects.placing import Eyes, eyes_at
+from mobee.vision.objects.placing import Eyes, eyes_at, locate_all
 from mobee.vision.objects.track import Track, Tracker, TrackSettings
 from mobee.vision.objects.watch import PictureWatch
 from mobee.vision.rig import Rig

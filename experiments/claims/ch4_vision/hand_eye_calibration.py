@@ -39,16 +39,13 @@ from mobee.robot.cameras import cameras_of
 from mobee.robot.load import load_robot
 from mobee.vision.ball import Sighting, find_balls
 from mobee.vision.calibration.calibration import Calibration
-from mobee.vision.calibration.offline import Watcher, watch_hand
-from mobee.vision.calibration.postures import choose_postures
+from mobee.vision.calibration.observing import Watcher, choose_postures, watch_hand
 from mobee.vision.calibration.solve import calibrate
 from mobee.vision.encoders import Moment
-from mobee.vision.exposure import Cameras
-from mobee.vision.imperfections import CameraErrors, CameraSettings, camera_errors
+from mobee.vision.imperfections import CameraErrors, Cameras, CameraSettings, camera_errors
 from mobee.vision.lens import camera_frames, into
 from mobee.vision.objects.detectors import detector_of
-from mobee.vision.objects.locating import locate_all
-from mobee.vision.objects.placing import eyes_at
+from mobee.vision.objects.placing import eyes_at, locate_all
 from mobee.vision.objects.thing import things_in
 from mobee.vision.rig import Rig, see_points
 from mobee.vision.stereo import Sighted, rays_meet

@@ -46,15 +46,12 @@ from mobee.model.model import Model
 from mobee.model.world_file import load_world
 from mobee.rendering.scene import Scene, clutter, room
 from mobee.vision.calibration.calibration import Calibration
-from mobee.vision.calibration.offline import Watcher, watch_hand
-from mobee.vision.calibration.postures import choose_postures
+from mobee.vision.calibration.observing import Watcher, choose_postures, watch_hand
 from mobee.vision.calibration.solve import calibrate
 from mobee.vision.encoders import Moment
-from mobee.vision.exposure import Cameras
-from mobee.vision.imperfections import CameraErrors, CameraSettings, camera_errors
+from mobee.vision.imperfections import CameraErrors, Cameras, CameraSettings, camera_errors
 from mobee.vision.objects.detectors import detector_of
-from mobee.vision.objects.locating import locate_all
-from mobee.vision.objects.placing import Eyes, Placed, eyes_at
+from mobee.vision.objects.placing import Eyes, Placed, eyes_at, locate_all
 from mobee.vision.objects.thing import Thing, things_in
 from mobee.vision.objects.track import Tracker
 

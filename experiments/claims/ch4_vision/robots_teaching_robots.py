@@ -36,8 +36,7 @@ from mobee.model.model import Model
 from mobee.model.world_file import load_world
 from mobee.robot.cameras import cameras_of
 from mobee.robot.load import load_robot
-from mobee.vision.calibration.offline import Watcher, watch_hand
-from mobee.vision.calibration.postures import choose_postures
+from mobee.vision.calibration.observing import Watcher, choose_postures, watch_hand
 from mobee.vision.calibration.solve import calibrate
 from mobee.vision.imperfections import CameraSettings, camera_errors
 from mobee.vision.rig import Rig

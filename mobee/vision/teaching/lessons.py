@@ -18,7 +18,7 @@ from mobee.model.kinematics import link_transforms
 from mobee.model.model import Model
 from mobee.robot.robot import Robot
 from mobee.vision.ball import find_balls
-from mobee.vision.calibration.offline import PERIOD, Watcher
+from mobee.vision.calibration.observing import PERIOD, Watcher
 from mobee.vision.encoders import Moment
 from mobee.vision.lens import camera_frames, into
 from mobee.vision.rig import Rig, see_points

@@ -21,8 +21,7 @@ from mobee.roadmap.edges import check_edges
 from mobee.roadmap.ik.problem import Problem
 from mobee.roadmap.ik.solve import Descent
 from mobee.robot.load import Robot
-from mobee.vision.exposure import Cameras
-from mobee.vision.imperfections import CameraSettings, camera_errors
+from mobee.vision.imperfections import Cameras, CameraSettings, camera_errors
 from mobee.vision.objects.detectors import detector_of
 from mobee.vision.objects.thing import things_in
 

@@ -10,12 +10,10 @@ import pytest
 from mobee import InvalidValue, UnknownName, World, load_world, sphere
 from mobee.rendering.scene import Scene, clutter, room
 from mobee.vision.encoders import Moment, Readings, moment_at
-from mobee.vision.exposure import Cameras
-from mobee.vision.imperfections import CameraErrors, CameraSettings, camera_errors
+from mobee.vision.imperfections import CameraErrors, Cameras, CameraSettings, camera_errors
 from mobee.vision.lens import DRAGONFLY
 from mobee.vision.objects.detectors import detector_of
-from mobee.vision.objects.locating import locate_all
-from mobee.vision.objects.placing import eyes_at
+from mobee.vision.objects.placing import eyes_at, locate_all
 from mobee.vision.objects.thing import things_in
 from mobee.vision.rig import see_tag
 from mobee.vision.tag import CELLS, FAMILY, NUMBER, Tag, aligned, find_tag, tag_solids

@@ -37,8 +37,7 @@ from mobee.vision.ball import find_balls
 from mobee.vision.encoders import Moment
 from mobee.vision.lens import Lens
 from mobee.vision.objects.detectors import detector_of
-from mobee.vision.objects.locating import locate_all
-from mobee.vision.objects.placing import Placed, eyes_at
+from mobee.vision.objects.placing import Placed, eyes_at, locate_all
 from mobee.vision.objects.thing import things_in
 from mobee.vision.rig import Rig
 from services.common.cameras import frame_at_capture

@@ -12,7 +12,7 @@ from mobee.model.world_file import load_world
 from mobee.robot.cameras import cameras_of
 from mobee.robot.load import load_robot
 from mobee.vision.calibration.calibration import Observation
-from mobee.vision.calibration.postures import choose_postures
+from mobee.vision.calibration.observing import choose_postures
 from mobee.vision.encoders import Moment
 from mobee.vision.imperfections import CameraSettings
 from mobee.vision.rig import Rig, see_tag

@@ -9,12 +9,10 @@ import pytest
 from mobee import InvalidValue, UnknownName, World, capsule, load_world, sphere
 from mobee.rendering.scene import Scene, clutter, room
 from mobee.vision.encoders import Moment
-from mobee.vision.exposure import Cameras
-from mobee.vision.imperfections import CameraErrors, CameraSettings
+from mobee.vision.imperfections import CameraErrors, Cameras, CameraSettings
 from mobee.vision.objects.detection import Detection
 from mobee.vision.objects.detectors import detector_of
-from mobee.vision.objects.locating import locate_all
-from mobee.vision.objects.placing import eyes_at
+from mobee.vision.objects.placing import eyes_at, locate_all
 from mobee.vision.objects.thing import Thing, things_in
 from tests.mobee.vision.calibration.synthetic import RIG, ROBOT
 from tests.mobee.vision.objects.drawn import THINGS

@@ -12,8 +12,7 @@ import pytest
 
 from mobee import InvalidValue, load_world
 from mobee.rendering.scene import Scene, clutter, room
-from mobee.vision.exposure import Cameras
-from mobee.vision.imperfections import CameraErrors, CameraSettings
+from mobee.vision.imperfections import CameraErrors, Cameras, CameraSettings
 from mobee.vision.objects.detection import outlined
 from mobee.vision.objects.detectors import detector_of, require_detector
 from mobee.vision.objects.learned.network import KEY, Network, load_network, network_of

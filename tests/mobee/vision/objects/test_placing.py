@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 from mobee import World, box
 from mobee.vision.lens import rotation_of
 from mobee.vision.objects.detection import Detection
-from mobee.vision.objects.locating import locate_all
-from mobee.vision.objects.placing import EDGE, Eye, Eyes, Outline, Placed
+from mobee.vision.objects.placing import EDGE, Eye, Eyes, Outline, Placed, locate_all
 from mobee.vision.objects.placing import place as place_outlines
 from mobee.vision.objects.thing import Thing, surface, touching, upright
 from tests.mobee.vision.objects.drawn import BALL, BOX, CUP, THINGS, eyes, seen

@@ -11,7 +11,7 @@ from mobee.errors import InvalidValue
 from mobee.model.model import Model
 from mobee.model.world_file import load_world
 from mobee.robot.cameras import cameras_of
-from mobee.vision.calibration.offline import Watcher
+from mobee.vision.calibration.observing import Watcher
 from mobee.vision.imperfections import CameraErrors, CameraSettings
 from mobee.vision.rig import Rig
 from mobee.vision.teaching.lessons import Lessons, gaze_postures, seeing_motors, split_by_pose, teacher_postures, watch_teacher
