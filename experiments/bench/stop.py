@@ -197,13 +197,13 @@ def report(result: dict[str, Any]) -> str:
         f"From a stop to estop in ms, {result['stops']} stops of each kind under each flood",
         f"at most {result['at_most_ms']:g} (p99) by the record (own machine) and by UDP (other machines);",
         f"load of the machine {result['load']:.1f}",
-        f"{'':<26}{'record':>12}{'UDP':>12}{'bus alone':>12}{'client':>7}",
-        f"{'flood':<26}" + 3 * f"{'p50':>6}{'p99':>6}" + f"{'p99':>7}{'armed':>7}",
+        f"{'':<26}{'record':>13}{'UDP':>13}{'bus alone':>13}{'client':>8}",
+        f"{'flood':<26}" + 3 * f"{'p50':>6}{'p99':>7}" + f"{'p99':>8}{'armed':>6}",
     ]
     for row in result["floods"]:
-        stops = "".join(f"{row[f'{what}_p50']:>6.1f}{row[f'{what}_p99']:>6.1f}" for what in ("stop_ms", "datagram_stop_ms", "bus_stop_ms"))
+        stops = "".join(f"{row[f'{what}_p50']:>6.1f}{row[f'{what}_p99']:>7.1f}" for what in ("stop_ms", "datagram_stop_ms", "bus_stop_ms"))
         ended = f"  ENDED: {', '.join(row['ended'])}" if row["ended"] else ""
-        lines.append(f"{row['flood']:<26}{stops}{row['connect_ms_p99']:>7.1f}{row['armed_again']:>7}{ended}")
+        lines.append(f"{row['flood']:<26}{stops}{row['connect_ms_p99']:>8.1f}{row['armed_again']:>6}{ended}")
     if result["late_by_bus"]:
         lines.append(f"late by the bus alone: {', '.join(result['late_by_bus'])}")
     if result["resting"]:

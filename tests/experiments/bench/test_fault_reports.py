@@ -60,10 +60,12 @@ def test_the_effect_of_a_fault_is_measured_only_if_no_other_is_near() -> None:
 
 def test_the_report_of_stops_fits_80_columns_and_names_ended_processes() -> None:
     row = {"flood": "calls of robot_sim's stat", "stop_ms_p50": 12.0, "stop_ms_p99": 168.2, "connect_ms_p50": 4.0, "connect_ms_p99": 60.0}
-    row |= {"bus_stop_ms_p50": 12.0, "bus_stop_ms_p99": 4146.2, "armed_again": 12, "ended": ["model"], "load": 2.0}
+    row |= {"datagram_stop_ms_p50": 12.0, "datagram_stop_ms_p99": 1242.1, "bus_stop_ms_p50": 12.0, "bus_stop_ms_p99": 4146.2}
+    row |= {"armed_again": 12, "ended": ["model"], "load": 2.0}
     given = {"stops": 12, "at_most_ms": 50.0, "floods": [row], "load": 2.0, "times_judged": True, "late": ["tokens"], "passed": False}
-    report = stop.report(given | {"late_by_bus": ["idle connections"]})
-    assert "ENDED: model" in report and "LATE: tokens" in report and "from another machine: idle connections" in report
+    report = stop.report(given | {"late_by_bus": ["idle connections"], "resting": ["tokens"]})
+    assert "ENDED: model" in report and "LATE: tokens" in report and "late by the bus alone: idle connections" in report
+    assert "NOT ARMED AGAIN after each release: tokens" in report and " 1242.1" in report
     assert max(len(line.partition("  ENDED")[0]) for line in report.splitlines()) <= 80
 
 
