@@ -159,7 +159,7 @@ def test_a_remaining_error_beyond_the_tolerance_is_no_arrival(say: Say, free: Pa
     [
         (["query", "{map}", "--to", "9", "0"], "the nearest vertex"),
         (["query", "{map}", "--to", "0"], "it must be (2,) finite numbers: yaw, elbow"),
-        (["query", "{map}", "--to", "0", "0", "--from", "1", "2", "3"], "give 2 task coordinates (yaw, elbow), or 41 angles"),
+        (["query", "{map}", "--to", "0", "0", "--from", "1", "2", "3"], "give 2 task coordinates (yaw, elbow), or 41 motor positions"),
         (["query", "{map}", "--to", "0", "0", "--from", *["9"] * 41], "cannot be at 9 rad"),
         (["query", "no.npz", "--to", "0"], "no such file"),
         (["play", "{map}", "--to", "0", "0", "--speed", "2"], "--speed 2: must be above 0"),
