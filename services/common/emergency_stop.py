@@ -169,7 +169,7 @@ class StopRecord:
 
 
 _WAITING = 1024  # messages that Zenoh keeps; senders repeat a stop, so that the newest are enough
-_LONGEST = 4096  # bytes; a stop is shorter
+_LONGEST = 16_384  # bytes; a stop is shorter, also with a reason of 2000 characters of four bytes
 _SETS = b"set\xc3"  # the field `set` = true in msgpack
 
 

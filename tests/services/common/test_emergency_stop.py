@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import socket
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -132,6 +133,18 @@ def test_a_datagram_stops_the_robot_and_is_confirmed(datagrams: StopDatagrams, f
         datagrams.confirm()
         wait_for(sender.is_confirmed, "the confirmation")
     assert datagrams.take() == []
+
+
+@pytest.mark.parametrize("character", ["x", "\N{OCTAGONAL SIGN}"])
+def test_a_stop_with_the_longest_reason_is_heard(bus: Rig, datagrams: StopDatagrams, free_port: int, character: str) -> None:
+    reason = 2000 * character
+    with StopSender(f"tcp/127.0.0.1:{free_port}", "mobee", reason) as sender:
+        sender.send()
+        assert [stop.reason for stop in wait_for(datagrams.take, "the datagram")] == [reason]
+    with open_client(bus.endpoint) as session:
+        line = StopLine(session)
+        publish = partial(bus.session.put, EStop.stream.key(), message(True, reason), encoding=encoding_of(EStop))
+        assert wait_for(lambda: publish() or line.take(), "the message")[0].reason == reason
 
 
 def test_datagrams_that_set_no_stop_are_dropped_without_an_answer(datagrams: StopDatagrams, free_port: int) -> None:
