@@ -22,6 +22,7 @@ from mobee.errors import InvalidValue
 from mobee.model.world_object import sphere
 from mobee.plant import Outcome
 from mobee.reach import TARGET, ReachOutcome, ReachTarget
+from mobee.robot.motor_units import unit_name
 from mobee.robot.robot import Robot
 
 _FLOAT = np.dtype(np.float64)
@@ -40,9 +41,10 @@ class Actions:
         alive: (n,) whether each motor is active, that is, may move; a part without active motors cannot act.
     """
 
-    __slots__ = ("_alive", "_limits", "_next_check", "_parts", "_row", "_start", "_under_way", "_verdict", "parts")
+    __slots__ = ("_alive", "_limits", "_next_check", "_parts", "_robot", "_row", "_start", "_under_way", "_verdict", "parts")
 
     def __init__(self, robot: Robot, alive: NDArray[np.bool_]) -> None:
+        self._robot = robot
         self._parts, self._row = robot.parts, {name: row for row, name in enumerate(robot.parts)}
         self._alive = {name: bool(alive[part.slice].any()) for name, part in robot.parts.items()}
         self._limits = {name: robot.limits[part.slice].tolist() for name, part in robot.parts.items()}
@@ -57,7 +59,9 @@ class Actions:
         return tuple(compress(self._parts, self._under_way.tolist()))
 
     def require_possible(self, part: str, target: Array) -> None:
-        """Check a target (n_part,) rad for a part: raise InvalidValue if no motor of the part is active, or if it is beyond the limits.
+        """Check a target (n_part,) of a part, rad or, for motors that slide, m.
+
+        Raises InvalidValue if no motor of the part is active, or if the target is beyond the limits.
 
         The values of a target with a wrong shape are not checked; `Controller.set_attractor` refuses such a target.
         """
@@ -67,9 +71,10 @@ class Actions:
         motors = self._parts[part].motors
         if values.shape != (len(motors),):
             return
-        for at, (low, high), motor in zip(values.tolist(), self._limits[part], motors, strict=True):
+        for index, (at, (low, high)) in enumerate(zip(values.tolist(), self._limits[part], strict=True)):
             if not low <= at <= high:
-                raise InvalidValue(f"target {at:.4g} rad for {motor}: must be within {low:.4g} to {high:.4g} rad")
+                unit = unit_name(self._robot, self._robot.motor_table[self._parts[part].start + index])
+                raise InvalidValue(f"target {at:.4g} {unit} for {motors[index]}: must be within {low:.4g} to {high:.4g} {unit}")
 
     def begin(self, part: str, start: float, first_check: float) -> None:
         """Start an action of a part at time `start` [s]; the first check whether the part has settled is `first_check` [s] later."""

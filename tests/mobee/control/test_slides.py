@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from mobee.arrays import Array
 from mobee.control.gains import Gains
 from mobee.control.law import Law, largest_step
+from mobee.errors import InvalidValue
 from mobee.model.model import Model
 from mobee.robot.motor_units import SLIDE_RANGE
 from mobee.robot.robot import Clause, Robot
@@ -94,6 +95,12 @@ def test_a_slide_settles_within_a_millimetre_from_5_to_95_percent_of_its_range(s
         assert outcome.settled
         assert abs(outcome.q[0] - target[0]) < 1e-3
         assert abs(plant.motors.q[1] - target[0]) < 1e-3
+
+
+def test_a_refused_target_is_in_metres() -> None:
+    plant = OfflinePlant(Model(SLIDING), contact_forces=False)
+    with pytest.raises(InvalidValue, match=r"target 0\.2 m for m1: must be within -0\.05236 to 0\.05236 m$"):
+        plant.begin("arm", np.array([0.2, 0.0]))
 
 
 def test_play_and_noise_of_a_slide_follow_its_range_unless_given_for_each_motor() -> None:
