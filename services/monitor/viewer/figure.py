@@ -30,18 +30,29 @@ def drawn(
     `position` (3,) m, of the centre, and `rotation` (3, 3): in the frame of the Rerun entity. `color`: red, green, blue, opacity, 0 to 255.
     `vertices`: (v, 3) m in the frame of the shape, for kind "convex" only.
     """
-    w, x, y, z = quaternion_from_matrix(rotation)
-    turns, colors, fill = [rr.Quaternion(xyzw=[x, y, z, w])], [color], rr.components.FillMode.Solid
     if kind == "convex":
         return _mesh(position + (np.empty((0, 3)) if vertices is None else vertices) @ rotation.T, color)
+    return drawn_together(kind, [size], position[None], rotation[None], [color])
+
+
+def drawn_together(
+    kind: ShapeKind, sizes: Sequence[tuple[float, ...]], positions: Array, rotations: Array, colors: Sequence[Rgba]
+) -> rr.AsComponents:
+    """Return shapes of one kind, which is not "convex", as one Rerun component.
+
+    The sizes, the positions (k, 3) m of the centres, the rotations (k, 3, 3) and the colours of the k shapes are as in `drawn`.
+    """
+    turns = [rr.Quaternion(xyzw=wxyz[[1, 2, 3, 0]]) for wxyz in quaternion_from_matrix(rotations)]
+    fill, first = rr.components.FillMode.Solid, [size[0] for size in sizes]
     if kind == "box":
-        return rr.Boxes3D(sizes=[size], centers=[position], quaternions=turns, colors=colors, fill_mode=fill)
+        return rr.Boxes3D(sizes=sizes, centers=positions, quaternions=turns, colors=colors, fill_mode=fill)
     if kind == "sphere":
-        return rr.Ellipsoids3D(radii=[size[0]], centers=[position], quaternions=turns, colors=colors, fill_mode=fill)
+        return rr.Ellipsoids3D(radii=first, centers=positions, quaternions=turns, colors=colors, fill_mode=fill)
+    lengths = [size[1] for size in sizes]
     if kind == "capsule":  # drawn from one end
-        start, (radius, length) = position - rotation[:, 2] * size[1] / 2.0, size
-        return rr.Capsules3D(radii=[radius], lengths=[length], translations=[start], quaternions=turns, colors=colors, fill_mode=fill)
-    return rr.Cylinders3D(radii=[size[0]], lengths=[size[1]], centers=[position], quaternions=turns, colors=colors, fill_mode=fill)
+        starts = positions - rotations[:, :, 2] * np.array(lengths)[:, None] / 2.0
+        return rr.Capsules3D(radii=first, lengths=lengths, translations=starts, quaternions=turns, colors=colors, fill_mode=fill)
+    return rr.Cylinders3D(radii=first, lengths=lengths, centers=positions, quaternions=turns, colors=colors, fill_mode=fill)
 
 
 def recolored(kind: ShapeKind, color: Rgba) -> rr.AsComponents:

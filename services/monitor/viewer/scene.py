@@ -10,14 +10,16 @@ import rerun as rr
 
 from bus_schema.messages import ContactItem, WorldObject
 from bus_schema.rpc import ObjectState
-from mobee.arrays import Array
+from mobee.arrays import Array, Ints
 from mobee.model.kinematics import link_transforms, matrix_from_quaternion, quaternion_from_matrix
 from mobee.rendering import palette
 from mobee.rendering.solid import link_solids
-from mobee.robot.robot import Robot, Shape
+from mobee.robot.robot import Robot, Shape, ShapeKind
+from mobee.robot.urdf.hull import facets
 from services.monitor.viewer.blueprint import ROOT
-from services.monitor.viewer.figure import drawn, drawn_link
+from services.monitor.viewer.figure import drawn, drawn_link, drawn_together
 from services.monitor.viewer.frames import Frames
+from services.monitor.web.surfaces import flat
 
 
 class Links:
@@ -45,6 +47,13 @@ class Links:
 TRAIL = 60  # points a hand
 TRAIL_STEP = 2  # updates for each point
 TRAIL_PIECES = 8  # of fading brightness
+FIELD_PATHS: dict[ShapeKind, str] = {  # entities of the fields, one for each kind of shape that the robot's fields have
+    "capsule": "scene/fields/capsules",
+    "sphere": "scene/fields/spheres",
+    "cylinder": "scene/fields/cylinders",
+    "box": "scene/fields/boxes",
+    "convex": "scene/fields/hulls",
+}
 HANDS = {"left_palm": palette.PARTS["left_arm"], "right_palm": palette.PARTS["right_arm"]}
 
 
@@ -57,17 +66,20 @@ class Scene:
 
     def __init__(self, stream: rr.RecordingStream | Frames, robot: Robot) -> None:
         self._stream, self._robot = stream, robot
-        self._fields = [shape for shape in robot.shapes if shape.role == "field"]
+        self._all_fields = [shape for shape in robot.shapes if shape.role == "field"]
+        self._fields = self._all_fields
+        self._field_paths = {kind: path for kind, path in FIELD_PATHS.items() if any(shape.kind == kind for shape in self._fields)}
+        self._hulls = {one.name: _hull(one) for one in self._fields if one.kind == "convex"}
         self._trails: dict[str, deque[Array]] = {name: deque(maxlen=TRAIL) for name in HANDS if name in robot.markers}
         self._objects: dict[str, ObjectState | WorldObject] = {}
         self._updates = 0
-        for path in ("fields/capsules", "fields/spheres", "objects", "trails"):
-            stream.log(f"scene/{path}", rr.CoordinateFrame(ROOT), static=True)
+        for path in (*self._field_paths.values(), "scene/objects", "scene/trails"):
+            stream.log(path, rr.CoordinateFrame(ROOT), static=True)
         self._links = Links(stream, robot)
 
     def show_fields(self, shown: bool) -> None:
         """Show or hide the robot's fields (volumes that cause repulsive forces), from the next update on."""
-        self._fields = [shape for shape in self._robot.shapes if shape.role == "field"] if shown else []
+        self._fields = self._all_fields if shown else []
 
     def forget(self) -> None:
         """Delete the trails of the hands, because a new run has begun."""
@@ -104,32 +116,17 @@ class Scene:
         self._stream.log(f"scene/objects/{thing.name}", rr.CoordinateFrame(ROOT), body)
 
     def _log_fields(self, transforms: Array, touched: set[str]) -> None:
-        capsules = [shape for shape in self._fields if shape.kind == "capsule"]
-        spheres = [shape for shape in self._fields if shape.kind == "sphere"]
-        lengths = [shape.size[1] for shape in capsules]
-        turns = np.array([transforms[shape.link, :3, :3] @ shape.rotation for shape in capsules]).reshape(-1, 3, 3)
-        centres = np.array([_now(transforms, shape) for shape in capsules]).reshape(-1, 3)
-        starts = centres - turns[:, :, 2] * np.array(lengths)[:, None] / 2.0
-        self._stream.log(
-            "scene/fields/capsules",
-            rr.Capsules3D(
-                lengths=lengths,
-                radii=[shape.size[0] for shape in capsules],
-                translations=starts,
-                quaternions=[rr.Quaternion(xyzw=wxyz[[1, 2, 3, 0]]) for wxyz in quaternion_from_matrix(turns)],
-                colors=[_field_color(shape, touched) for shape in capsules],
-                fill_mode="solid",
-            ),
-        )
-        self._stream.log(
-            "scene/fields/spheres",
-            rr.Ellipsoids3D(
-                radii=[shape.size[0] for shape in spheres],
-                centers=[_now(transforms, shape) for shape in spheres],
-                colors=[_field_color(shape, touched) for shape in spheres],
-                fill_mode="solid",
-            ),
-        )
+        for kind, path in self._field_paths.items():
+            shapes = [shape for shape in self._fields if shape.kind == kind]
+            colors = [palette.TOUCHED if shape.name in touched else palette.FIELD for shape in shapes]
+            moved = transforms[[shape.link for shape in shapes]]
+            if kind == "convex":
+                body = _hulls([self._hulls[shape.name] for shape in shapes], moved, colors)
+            else:
+                turns = np.array([link[:3, :3] @ shape.rotation for link, shape in zip(moved, shapes, strict=True)]).reshape(-1, 3, 3)
+                centres = [link[:3, :3] @ shape.position + link[:3, 3] for link, shape in zip(moved, shapes, strict=True)]
+                body = drawn_together(kind, [shape.size for shape in shapes], np.array(centres).reshape(-1, 3), turns, colors)
+            self._stream.log(path, body)
 
     def _log_trails(self, transforms: Array) -> None:
         strips, colors = [], []
@@ -147,12 +144,28 @@ class Scene:
             self._stream.log("scene/trails", rr.LineStrips3D(strips, colors=colors, radii=0.003))
 
 
-def _now(transforms: Array, shape: Shape) -> Array:
-    return transforms[shape.link, :3, :3] @ shape.position + transforms[shape.link, :3, 3]
+def _hull(shape: Shape) -> tuple[Array, Array, Ints]:
+    """Return corners (v, 3) m, normals (v, 3) and triangles (t, 3) of a convex shape, in the root frame with every joint at zero."""
+    assert shape.vertices is not None
+    return flat(facets(shape.position + shape.vertices @ shape.rotation.T))
 
 
-def _field_color(shape: Shape, touched: set[str]) -> tuple[int, int, int, int]:
-    return palette.TOUCHED if shape.name in touched else palette.FIELD
+def _hulls(hulls: list[tuple[Array, Array, Ints]], transforms: Array, colors: list[palette.Rgba]) -> rr.Mesh3D:
+    """Return convex bodies as one mesh.
+
+    `hulls`: corners, normals and triangles of each body at zero pose. `transforms`: (k, 4, 4), the pose of each body's link. `colors`: one
+    for each body.
+    """
+    corners, normals, triangles, paint, count = [np.empty((0, 3))], [np.empty((0, 3))], [np.empty((0, 3), dtype=np.intp)], [], 0
+    for (points, outward, indices), link, color in zip(hulls, transforms, colors, strict=True):
+        corners.append(points @ link[:3, :3].T + link[:3, 3])
+        normals.append(outward @ link[:3, :3].T)
+        triangles.append(indices + count)
+        paint += [color] * len(points)
+        count += len(points)
+    return rr.Mesh3D(
+        vertex_positions=np.vstack(corners), triangle_indices=np.vstack(triangles), vertex_normals=np.vstack(normals), vertex_colors=paint
+    )
 
 
 KEPT = 600  # poses

@@ -11,6 +11,7 @@ import sys
 import time
 import urllib.request
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from bus_schema.messages import Clock, ContactItem, Contacts, Event, Forces, Geo
 from bus_schema.rpc import ObjectState
 from mobee.model.kinematics import link_transforms
 from mobee.robot.load import load_robot
+from mobee.robot.robot import Shape, ShapeKind
 from tests.services.robots import ARM
 from tests.services.stage import LOOKING_DOWN, Stage, posture
 
@@ -32,7 +34,7 @@ from mobee.rendering.solid import BUDGET  # noqa: E402  # only where Rerun is
 from services.monitor.viewer.blueprint import blueprint, shown_of  # noqa: E402  # only where Rerun is
 from services.monitor.viewer.files import program  # noqa: E402  # only where Rerun is
 from services.monitor.viewer.plots import Plots  # noqa: E402  # only where Rerun is
-from services.monitor.viewer.scene import Scene  # noqa: E402  # only where Rerun is
+from services.monitor.viewer.scene import FIELD_PATHS, Scene  # noqa: E402  # only where Rerun is
 
 ROBOT = load_robot("icub")
 DOWN = posture(ROBOT, LOOKING_DOWN)
@@ -92,6 +94,42 @@ def test_a_field_is_red_while_it_is_in_contact() -> None:
     shown = [item for item in notebook.logged["scene/fields/capsules"] if isinstance(item, rr.Capsules3D)]
     assert channels(shown[0]) == [palette.TOUCHED if name == capsules[3] else palette.FIELD for name in capsules]
     assert set(channels(shown[1])) == {palette.FIELD}
+
+
+def test_fields_of_every_kind_are_drawn_and_move_as_their_links_do() -> None:
+    sizes: dict[ShapeKind, tuple[float, ...]] = {
+        "sphere": (0.1,),
+        "capsule": (0.1, 0.4),
+        "cylinder": (0.1, 0.4),
+        "box": (0.1, 0.2, 0.3),
+        "convex": (),
+    }
+    place, turn = np.array([0.1, 0.2, 0.3]), np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+    cube = np.array([[x, y, z] for x in (-0.1, 0.1) for y in (-0.1, 0.1) for z in (-0.1, 0.1)])
+    hand = ROBOT.links.index("l_hand")
+    made = [
+        Shape(f"field_{kind}", hand, kind, size, place, turn, "field", "left_arm", cube if kind == "convex" else None)
+        for kind, size in sizes.items()
+    ]
+    notebook = Notebook()
+    scene = Scene(notebook.stream, replace(ROBOT, shapes=tuple(made)))
+    scene.log_robot(DOWN, [])
+    scene.show_fields(False)
+    scene.log_robot(DOWN, [])
+    link = link_transforms(ROBOT, DOWN)[hand]
+    centre = link[:3, :3] @ place + link[:3, 3]
+    for kind, path in FIELD_PATHS.items():
+        _, shown, hidden = notebook.logged[path]
+        name = {"box": "centers", "sphere": "centers", "cylinder": "centers", "capsule": "translations", "convex": "vertex_positions"}[kind]
+        points = np.array(getattr(shown, name).as_arrow_array().to_pylist())
+        if kind == "convex":
+            local = (points - centre) @ link[:3, :3] @ turn
+            np.testing.assert_allclose(np.abs(local), 0.1, atol=1e-6)
+            assert len(shown.triangle_indices.as_arrow_array()) == 12
+        else:
+            start = link[:3, :3] @ turn[:, 2] * 0.2 if kind == "capsule" else 0.0
+            np.testing.assert_allclose(points, [centre - start], atol=1e-6)
+        assert len(getattr(hidden, name).as_arrow_array()) == 0
 
 
 def test_a_robot_without_meshes_is_drawn_by_its_solids_which_move_as_its_links_do(tmp_path: Path) -> None:
