@@ -265,8 +265,11 @@ class Quality:
 def judge(detect: Detector, names: Sequence[str], pictures: Sequence[Labelled]) -> Quality:
     """Measure the quality of a detector on labelled pictures.
 
-    `names`: names of the N things, in the order of the last axis of `Labelled.shares` (H, W, N).
+    `names`: names of the N things, in the order of the last axis of `Labelled.shares` (H, W, N). Raises InvalidValue if there are no
+    pictures.
     """
+    if not pictures:
+        raise InvalidValue("no pictures: a detector is judged on at least one")
     errors: dict[str, list[float]] = {name: [] for name in names}
     false, seconds = 0, 0.0
     for one in pictures:

@@ -16,7 +16,7 @@ from mobee.vision.imperfections import CameraErrors, Cameras, CameraSettings
 from mobee.vision.objects.detection import outlined
 from mobee.vision.objects.detectors import detector_of, require_detector
 from mobee.vision.objects.learned.network import KEY, Network, load_network, network_of
-from mobee.vision.objects.learned.training import HIDDEN, surroundings, train
+from mobee.vision.objects.learned.training import HIDDEN, judge, surroundings, train
 from services.vision.config import Config
 from tests.mobee.vision.calibration.synthetic import RIG, ROBOT
 from tests.mobee.vision.objects.drawn import BALL, THINGS
@@ -45,6 +45,11 @@ def test_opencv_computes_for_the_picture_what_was_trained_for_its_pixels(rng: np
     found = network_of(THINGS, first, second, third).shares()(picture)
     np.testing.assert_allclose(found.reshape(3, -1).T, expected, atol=1e-4)
     assert 0.1 < np.mean((expected > 0.0) & (expected < 1.0))
+
+
+def test_a_detector_is_not_judged_without_pictures() -> None:
+    with pytest.raises(InvalidValue, match="at least one"):
+        judge(lambda picture: [], [BALL.name], [])
 
 
 def test_a_trained_detector_finds_the_outline_of_the_ball_in_a_picture_that_it_has_not_seen(tmp_path: Path) -> None:
