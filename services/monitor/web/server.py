@@ -11,6 +11,7 @@ import hmac
 import json
 import mimetypes
 import shutil
+import sys
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -136,7 +137,9 @@ class _Server(ThreadingHTTPServer):
     block_on_close = False
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """A browser that closes a connection is no error."""
+        """Print the traceback of an exception in the handling of a request, unless the browser has closed its connection (OSError)."""
+        if not isinstance(sys.exception(), OSError):
+            super().handle_error(request, client_address)
 
 
 class PageServer:
@@ -211,7 +214,10 @@ class _Handler(BaseHTTPRequestHandler):
             self._send(HTTPStatus.BAD_REQUEST, "text/plain", b"the query is not valid\n")
 
     def do_POST(self) -> None:
-        """Do what a page with the key asks for."""
+        """Execute the command that a page sends, such as "stop" or "goal", if the request contains the secret key from the page's address.
+
+        Requests from another page, without the key, or in an invalid form are refused.
+        """
         if not self._is_local() or not self._is_from_the_page():
             return
         given = self.headers.get("Content-Length") or "0"
@@ -240,7 +246,10 @@ class _Handler(BaseHTTPRequestHandler):
             self._answer(HTTPStatus.OK, False, str(refused))
 
     def _is_local(self) -> bool:
-        """Refuse a request under another name than loopback's: a page of the internet could have sent the browser here."""
+        """Return whether the browser asked for this machine by a name of the loopback interface; otherwise, also send a refusal.
+
+        A page of the internet could make the user's browser send a request with another name.
+        """
         host = self.headers.get("Host", "").rpartition(":")[0] or self.headers.get("Host", "")
         if host in LOOPBACK:
             return True

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import http.client
 import json
+import socket
+import struct
 import threading
 import time
 from collections.abc import Iterator
@@ -28,6 +30,8 @@ class Asked:
         self.calls.append((page, verb, arguments))
         if verb == "fly":
             raise Refused("it has no wings")
+        if verb == "break":
+            raise ValueError("a defect")
         return "done"
 
     def tend(self, open_pages: set[str]) -> None:
@@ -62,6 +66,20 @@ def test_the_page_may_load_nothing_from_elsewhere(served: tuple[PageServer, Aske
     files = Path(__file__).parents[3] / "services" / "monitor" / "web" / "files"
     for file in files.iterdir():
         assert "//" not in file.read_text().replace("// ", "").replace("//\n", ""), f"{file} has an address"
+
+
+def test_a_defect_in_a_call_is_printed_and_a_browser_that_leaves_is_not(
+    served: tuple[PageServer, Asked], capfd: pytest.CaptureFixture[str]
+) -> None:
+    server = served[0]
+    with pytest.raises(http.client.RemoteDisconnected):
+        ask(server, "POST", "/do", CALL | {"verb": "break"}, X_Key="secret")
+    assert "ValueError: a defect" in capfd.readouterr().err
+    with socket.create_connection(("127.0.0.1", server.port)) as browser:
+        browser.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1")
+        browser.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))  # reset
+    assert ask(server, "GET", "/")[0] == 200
+    assert capfd.readouterr().err == ""
 
 
 def test_a_call_without_the_key_or_from_another_page_is_refused(served: tuple[PageServer, Asked]) -> None:
