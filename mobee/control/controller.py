@@ -57,7 +57,10 @@ class Controller:
         alive: NDArray[np.bool_] | None = None,
         terms: Sequence[Term] = (),
     ) -> None:
-        """Start at rest, with the attractor at the robot's home; raises InvalidValue and UnknownName.
+        """Start at rest, with the attractor at the robot's home.
+
+        Raises InvalidValue if `model`, `gains`, `speed_scale`, `alive` or `terms` is not valid. Raises UnknownName for an unknown modality
+        or propagation, or if a pattern that was given to `Gains.with_motors` matches no motor of the robot.
 
         Args:
             model: the robot in its world; it evaluates contacts when `step` is given neither forces nor a pose.
@@ -77,6 +80,11 @@ class Controller:
             raise InvalidValue(f"speed_scale {speed_scale}: must be above 0 and at most 1")
         if modality not in ("position", "velocity", "torque"):
             raise UnknownName("modality", modality, ("position", "velocity", "torque"))
+        if propagate not in ("tree", "part"):
+            raise UnknownName("propagation", propagate, ("tree", "part"))
+        count = len(model.robot.motors)
+        if alive is not None and not (isinstance(alive, np.ndarray) and alive.dtype == np.bool_ and alive.shape == (count,)):
+            raise InvalidValue(f"alive is {alive!r}; it must be an array of {count} booleans, one for each motor, or None.")
         self.model = model
         self._track = model.track()
         self.robot = model.robot
@@ -247,7 +255,7 @@ class Controller:
         return self._reaches.is_approaching(part)
 
     def reset(self, q: Array) -> None:
-        """Set the control law to rest at the measured q (n,) rad: own velocity 0, attractor and position reference at q.
+        """Set the control law to rest at the measured q (n,) rad: velocity of the law's state 0, attractor and position reference at q.
 
         Forces given to `force` and `push`, and those that pull a marker to a target (`reach_toward`), continue.
         """
@@ -257,7 +265,7 @@ class Controller:
         self.note_forces(np.zeros((len(self.force_names), len(q))))
 
     def hold(self, part: str, q: Array) -> None:
-        """Stop a part: set its own velocity to 0 and its attractor to its measured position q (n_part,) rad.
+        """Stop a part: set its velocity in the control law's state to 0, and its attractor to its measured position q (n_part,) rad.
 
         The commanded velocity then decreases as fast as the acceleration limit allows.
         """
@@ -324,7 +332,7 @@ class Controller:
         return Command(*commands)
 
     def _filled(self, forces: Forces, q: Array, dt: float, pose: Pose | None) -> Forces:
-        """Return the given forces, completed by the forces of `terms` and those that depend on the law's state."""
+        """Return the given forces with those that are missing: of the user's `terms`, and of all terms that depend on the law's state."""
         more = self.own_forces(q, dt, pose, self._reaches.markers[:MAX_HANDS])
         if any(name not in forces for name in state_term_names()):
             more |= self.forces(self._evaluated(q) if pose is None else pose)
@@ -335,7 +343,11 @@ class Controller:
         return self._track.evaluate(q, self._reaches.markers[:MAX_HANDS]) if self._reaches else self._track.evaluate(q)
 
     def _add_client(self, q: Array, total: Array) -> None:
-        """Add f_config and f_work (thesis eqs. 5.9 and 5.10); for a motor that slides f_work is converted to its unit, as for a contact."""
+        """Add the client's forces to `total` (n,) rad/s^2, in place: f_config on the motors (thesis eq. 5.9), f_work on markers (eq. 5.10).
+
+        f_work is projected to the motors by the Jacobian and, for a motor that slides, converted to its unit, as for a contact. Then each
+        of the two is bounded separately (`Law.add_client`).
+        """
         self.law.add_client(self._client, total)
         if self._pushes:
             projected = sum((self.model.jacobian(q, m)[: len(f)].T @ f for m, f in self._pushes.items()), np.zeros(len(q)))

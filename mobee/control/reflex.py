@@ -59,10 +59,11 @@ class ReflexSettings:
 
     @classmethod
     def naive(cls) -> ReflexSettings:
-        """Return the settings of thesis 4.1: a violation counts immediately, and control returns to the client at the first waypoint.
+        """Return the settings of thesis 4.1: a violation (such as a contact) counts immediately, and the robot does not brake or wait.
 
-        With these settings, control oscillates between the client (the program that commands the robot) and the reflex, and recoveries fail
-        (thesis 4.4).
+        While the reflex retraces the recorded poses, it returns control to the client (the program that commands the robot) at the first
+        waypoint, a pose that was marked as safe, or at the oldest pose, even if this pose has a violation. With these settings, control
+        oscillates between the client and the reflex, and recoveries fail (thesis 4.4).
         """
         return cls(confirm=0.0, release=0.0, brake=0.0, dead_time=0.0, must_be_clear=False)
 
@@ -120,7 +121,7 @@ class Watch:
         return (*contacts, *limits, *self._broken(pose))
 
     def _broken(self, pose: Pose) -> list[Violation]:
-        """Return the clauses of which no row holds."""
+        """Return the violated clauses (conditions on motor positions): those of whose rows a.q + b > 0 none holds, beyond the tolerance."""
         rows = self._rows
         if not len(rows.b):
             return []
@@ -200,16 +201,20 @@ class Reflex:
     """
 
     def __init__(self, settings: ReflexSettings, dt: float, max_velocity: Array) -> None:
-        """Start in state "forward" without recorded poses; raises InvalidValue for an argument that is not valid.
+        """Start in state "forward" without recorded poses; raises InvalidValue if `dt` or `max_velocity` is not valid.
 
-        `dt`: duration of a tick [s]. `max_velocity`: (n,) rad/s, largest velocity of the target while it retraces poses.
+        `dt`: duration of a tick [s], finite and above 0. `max_velocity`: (n,) rad/s, above 0: largest velocity of each motor's target
+        position in state "rewind", in which the target moves back along the recorded poses.
         """
         if not 0.0 < dt < math.inf:
             raise InvalidValue(f"tick of {dt} s: must be a finite time above 0")
+        fastest = np.asarray(max_velocity, dtype=float)
+        if not (fastest > 0.0).all():
+            raise InvalidValue(f"max_velocity {fastest} rad/s: must be above 0 for each motor")
         self.settings, self.counts = settings, Counts()
         self.state: State = "forward"
         self.recovery: Recovery | None = None  # the one in progress, else the last
-        self._dt, self._max_step = dt, np.asarray(max_velocity, dtype=float) * dt
+        self._dt, self._max_step = dt, fastest * dt
         self._history = deque[tuple[Array, bool]](
             maxlen=max(self._ticks(settings.history), 1)
         )  # recent poses, and whether each is a waypoint
@@ -273,7 +278,10 @@ class Reflex:
             self._end_stuck(self.recovery)
 
     def _judge(self, violations: Sequence[Violation]) -> bool:
-        """Return whether the pose is in violation, filtered; accepted violations are ignored until the pose has been without any."""
+        """Return whether the pose has a violation, filtered over several ticks by `Debounce`.
+
+        The violations that `accept` has accepted are ignored, until there has been no violation at all for the time `release`.
+        """
         if self._accepted and not self._all_clear.update(bool(violations)):
             self._accepted = frozenset()
         raw = any(violation.what not in self._accepted for violation in violations)
@@ -337,7 +345,7 @@ class Reflex:
         self.state = "stuck"
 
     def _keep_place(self, q: Array) -> None:
-        """Return control to the client at q, as a waypoint."""
+        """Change to state "forward", so that the client controls the robot again; record the pose q (n,) rad as a waypoint."""
         self._history.append((q.copy(), True))
         self.state = "forward"
 

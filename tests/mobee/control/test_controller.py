@@ -299,4 +299,10 @@ def test_an_unknown_modality_or_propagation_is_refused() -> None:
     with pytest.raises(UnknownName, match="modality 'force'.*position, torque, velocity"):
         arm_controller(modality="force")
     with pytest.raises(UnknownName, match="propagation 'arm'.*part, tree"):
-        arm_controller(propagate="arm").step(STRETCHED, DT)
+        arm_controller(propagate="arm")
+
+
+@pytest.mark.parametrize("alive", [np.ones(99, dtype=bool), np.ones(3), [True, True, True]], ids=["count", "numbers", "list"])
+def test_motors_that_are_not_one_boolean_each_are_refused(alive: Any) -> None:
+    with pytest.raises(InvalidValue, match="(?s)alive is .*must be an array of 3 booleans"):
+        arm_controller(alive=alive)

@@ -43,6 +43,12 @@ def rewind(reflex: Reflex, limit: int = 1000) -> list[float]:
     return went
 
 
+@pytest.mark.parametrize("velocity", [0.0, -1.0, np.nan])
+def test_a_rewind_that_would_not_move_is_refused(velocity: float) -> None:
+    with pytest.raises(InvalidValue, match="max_velocity .*above 0 for each motor"):
+        Reflex(quick(), DT, np.array([1.0, velocity]))
+
+
 def test_the_robot_retraces_its_path_to_the_waypoint() -> None:
     reflex = Reflex(quick(), DT, FAST)
     walk(reflex, 0, 1)
