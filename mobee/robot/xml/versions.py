@@ -65,7 +65,10 @@ LOWEST = 1e-6  # m; a shorter height axis counts as none, as in Qt
 
 @dataclass(frozen=True, slots=True)
 class _Change:
-    """An element that MoBeE 0.1 read differently: the rule of 0.1 in words, and today's attributes that express it."""
+    """An element that MoBeE 0.1 reads differently from today's program.
+
+    `rule`: the rule of 0.1 in words. `attributes`: attributes of today's grammar that give the element the meaning that it had in 0.1.
+    """
 
     node: Node
     rule: str
@@ -139,7 +142,10 @@ def _extensions(root: Node) -> Iterator[str]:
 
 
 def _refuse_repairs(root: Node) -> None:
-    """Raise the error of the first repaired fault: only the old programs accepted those."""
+    """Raise the error of the first fault in the XML file that `read_xml` has repaired, if there is one.
+
+    Only the programs of 2010 to 2014 accepted such faults, for example an attribute that is given twice.
+    """
     if root.repairs:
         raise root.repairs[0].error
 
@@ -174,7 +180,10 @@ def _times(changes: list[_Change]) -> str:
 
 
 def _changes(root: Node) -> Iterator[_Change]:
-    """Yield the elements that MoBeE 0.1 and today's grammar read differently; lists of points must be complete."""
+    """Yield a change for each element that MoBeE 0.1 and today's grammar read differently, with the rule of 0.1.
+
+    The attribute `points` of every <convex> must have three numbers for each point.
+    """
     waiting: list[tuple[Node, Array]] = [(root, np.zeros(3))]
     while waiting:
         node, step = waiting.pop()
@@ -190,6 +199,8 @@ def _changes(root: Node) -> Iterator[_Change]:
 
 
 def _turned(node: Node) -> Iterator[_Change]:
+    if node.tag == "convex" and len(node.numbers("points")) % 3:
+        return  # `mobee.robot.xml.body.read_convex` refuses it with its line
     axis, angle = direction(node, AXIS, (0.0, 1.0, 0.0)), np.deg2rad(node.number("angle", 0.0))
     rotation = turn_about(axis, angle) @ align(Y, axis)
     if np.abs(rotation - height_along(axis, angle)).max() <= 1e-12:

@@ -60,3 +60,15 @@ def test_a_robot_carries_a_convex_solid_and_a_convex_field(tmp_path: Path) -> No
 def test_points_without_a_volume_are_refused(points: str, message: str) -> None:
     with pytest.raises(RobotFileError, match=f"toy.xml:7: <convex> points: {message}"):
         read_convex(convex(points))
+
+
+@pytest.mark.parametrize("version", ["0.1", "1.0", "2.0"])
+def test_points_without_a_volume_are_refused_in_files_of_every_version(tmp_path: Path, version: str) -> None:
+    path = tmp_path / "toy.xml"
+    path.write_text(
+        f'<ZeroPositionKinematicTree version="{version}"><bodyPart name="a"><motor name="m" minPos="-10" maxPos="10" home="0"/>'
+        '<joint motor="m" minPos="-10" maxPos="10" x="1"><link length="0.2" x="1">\n'
+        '<convex points="0 0 0 1 0 0 0 1 0 0" hx="1" hy="0.3" hz="0.5" angle="30"/></link></joint></bodyPart></ZeroPositionKinematicTree>'
+    )
+    with pytest.raises(RobotFileError, match="toy.xml:2: <convex> points: has 10 numbers"):
+        read_robot(path)
