@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Summarises a run: the numbers of its services since all of them were ready, as JSON and as text."""
+"""Summarises a run as JSON and as text: what its services have counted and measured since all of them were ready."""
 
 from __future__ import annotations
 
@@ -14,15 +14,17 @@ from services.launcher.child import Watched
 def summarise(children: Iterable[Watched]) -> dict[str, Any]:
     """Return the measurements of a run by name, as JSON data; None for a number that was not measured.
 
-    "agents": for the agent of each part, the counts of transitions, timeouts and interruptions, and the mean time of an action.
-    "hold_ticks": number of ticks in which a part was in hold (stood still, followed no commands). "table_contact_ticks",
-    "field_contact_ticks", "solid_contact_ticks": number of ticks in which the table was touched, fields (volumes that cause repulsive
-    forces) were in contact, and solids were in contact. "missed_ticks": number of skipped ticks. "pairs_watched": number of pairs of bodies
-    that are tested for contact. "rejected_commands": number of refused commands, by reason. "command_age_ticks": percentiles of the age of
-    commands. "lockstep": for a run in lockstep (every tick waits for all participants), the number of ticks, the speed (times real time),
-    whether the run is repeatable, and the hash of its states. "restarts": number of restarts of each service. "services": all numbers of
-    each service. Lengths are in m, times in s, ages in ticks. Counters begin when every service was ready, or at the last restart of their
-    service.
+    The counts begin when every service was ready, or at the last restart of their service.
+
+    "agents": for the agent of each part, the counts of transitions, timeouts and interruptions, and the mean time of an action [s].
+    "ticks": number of ticks. "hold_ticks": number of ticks in which a part was in hold (stood still, followed no commands). "missed_ticks":
+    number of skipped ticks. "table_contact_ticks": number of ticks in which the table overlapped a solid or a field of a part (a field is a
+    larger volume that causes repulsive forces). "field_contact_ticks", "solid_contact_ticks": number of ticks in which any field, or any
+    solid, was in contact. "closest_gap_m": smallest distance of hands and forearms from obstacles. "deepest_solid_contact_m": depth of the
+    deepest solid contact. "pairs_watched": number of pairs of bodies that are tested for contact. "rejected_commands": number of refused
+    commands, by reason. "command_age_ticks": age of commands in ticks: percentiles "p50" and "p99", and "max". "lockstep": for a run in
+    lockstep (every tick waits for all participants), the number of ticks, the speed (times real time), whether the run is repeatable, and
+    the hash of its states; otherwise None. "restarts": number of restarts of each service. "services": all numbers of each service.
     """
     stats = {child.who: child.stat for child in children if child.stat is not None}
     sim, model = _Numbers(stats.get("robot_sim")), _Numbers(stats.get("model"))
@@ -46,7 +48,7 @@ def summarise(children: Iterable[Watched]) -> dict[str, Any]:
 
 
 class _Numbers:
-    """A service's numbers, some of which may be missing."""
+    """The numbers in the last statistics of a service (reply Stat). A number that the service has not sent is None."""
 
     def __init__(self, stat: Stat | None) -> None:
         self._numbers = {} if stat is None else stat.numbers
@@ -106,7 +108,7 @@ def as_text(summary: dict[str, Any]) -> str:
 def _robot_lines(summary: dict[str, Any]) -> list[str]:
     age = summary["command_age_ticks"]
     return [
-        f"  table           {_text(summary['table_contact_ticks'])} ticks of field contact, closest gap {_mm(summary['closest_gap_m'])}",
+        f"  table           {_text(summary['table_contact_ticks'])} ticks of contact, closest gap {_mm(summary['closest_gap_m'])}",
         f"  solid contact   deepest {_mm(summary['deepest_solid_contact_m'])} of {_text(summary['pairs_watched'])} watched pairs",
         f"  command age     p50 {_text(age['p50'], '', 0)}, p99 {_text(age['p99'], '', 0)}, worst {_text(age['max'], '', 0)} ticks",
         f"  ticks           {summary['ticks']}, {_text(summary['hold_ticks'])} in hold, {_text(summary['missed_ticks'])} missed",

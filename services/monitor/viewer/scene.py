@@ -121,7 +121,7 @@ class Scene:
             colors = [palette.TOUCHED if shape.name in touched else palette.FIELD for shape in shapes]
             moved = transforms[[shape.link for shape in shapes]]
             if kind == "convex":
-                body = _hulls([self._hulls[shape.name] for shape in shapes], moved, colors)
+                body: rr.AsComponents = _hulls([self._hulls[shape.name] for shape in shapes], moved, colors)
             else:
                 turns = np.array([link[:3, :3] @ shape.rotation for link, shape in zip(moved, shapes, strict=True)]).reshape(-1, 3, 3)
                 centres = [link[:3, :3] @ shape.position + link[:3, 3] for link, shape in zip(moved, shapes, strict=True)]
@@ -190,7 +190,7 @@ class Poses:
         stream.log("scene/poses", rr.CoordinateFrame(ROOT), static=True)
 
     def note(self, q: Array) -> None:
-        """Add the arms of the robot in the pose `q` (n,) rad, in which an action has ended."""
+        """Draw the arms of the robot in the pose `q` (n,) rad, in which an action has ended, in addition to the earlier ones."""
         transforms = link_transforms(self._robot, q)
         for part, (joint, markers) in self._chains.items():
             shoulder = self._robot.joints[joint]
