@@ -96,9 +96,10 @@ TITLES = {
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return the settings of the runs: learner and planners, if the planners' models are wrong, or everyone's, or nobody's ("nothing").
+    """Return the settings of the runs: one for each contestant (the learner, or a planner with one kind of memory) and each set of errors.
 
-    With "nothing" only the planner without memory is run.  With --quick there are at most 100 tries.
+    A set of errors says whose model is wrong: only the planners' ("planners"), or also MoBeE's ("everyone"); for these all contestants are
+    run.  If no model is wrong ("nothing"), only the planner without memory is run.  With --quick there are at most 100 tries.
     """
     tries = list(TRIES[:4] if arguments.quick else TRIES)
     return [
@@ -129,6 +130,11 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     if isinstance(player, Planner):
         found |= {"planning": player.planning, "remembered": player.peer.remembered}
     return found
+
+
+def summary(values: dict[str, Any]) -> dict[str, Any]:
+    """Return the values of `trial` for its record: of the times of planning only the median is kept, in a list."""
+    return values | ({"planning": [float(np.median(values["planning"]))]} if "planning" in values else {})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -169,7 +175,10 @@ class Scene:
         return arm_belief(cables=False, turns=self.turns if self.wrong == "planners" else None)
 
     def seen(self, target: ReachTarget) -> ReachTarget:
-        """Return a target at the position that the planners believe: wrong by `shift` if `wrong` is "planners", else as MoBeE sees it."""
+        """Return a target at the position that the planners believe, which includes `shift` (3,) m if `wrong` is "planners".
+
+        Otherwise the target is returned as it is given, at the position that MoBeE believes.
+        """
         return replace(target, position=target.position + self.shift) if self.wrong == "planners" else target
 
 
@@ -199,7 +208,11 @@ def _world(ball: Array) -> World:
 
 
 def _ball(rng: np.random.Generator, targets: Array) -> Array:
-    """Return a position of the palm, away from the targets and from the robot at home, at which a ball blocks some motions."""
+    """Draw the position of the centre of the ball that blocks motions, (3,) m, root frame: one that the palm reaches in a random pose.
+
+    There the ball is at least 12 cm from all targets and has no contact with the robot at home.  It blocks 8 to 30 % of 100 straight
+    motions between states, in addition to those that were blocked before.  Raises InvalidValue if no position is found in 400 draws.
+    """
     low, high = body().limits[[body().motor_index(name) for name in RIGHT]].T
     pairs = list(permutations(range(len(space())), 2))
     chosen = [pairs[i] for i in rng.permutation(len(pairs))[:100]]
@@ -300,7 +313,7 @@ class Planner:
         """Processor time of each try so far, s."""
 
     def learn(self, tries: int) -> None:
-        """Try to reach targets `tries` more times, and keep what `memory` names; as in `Contestant.learn`."""
+        """Make `tries` more tries, and remember blocked motions and missed poses as `memory` allows; as in `Contestant.learn`."""
         for _ in range(tries):
             rng = np.random.default_rng([self._seed, 861, self._tries])
             target = self._problems.least_tried(self._scene.targets, rng)
@@ -409,7 +422,10 @@ def crossover(tries: list[int], learner: Array, peer: Array) -> Array:
 
 
 def _leads(wrong: str, by: int, least: float) -> Rule:
-    """Return the rule that the learner's lead over every peer is at least `least` after `by` tries."""
+    """Return the rule that the learner's share of successes after `by` tries exceeds that of every planner by at least `least`.
+
+    `wrong`: whose model is wrong, "nothing", "planners" or "everyone".
+    """
 
     def of_cells(done: Cells) -> Measured:
         tries, learner = success(done, "learner", wrong)
@@ -457,7 +473,10 @@ CLAIMS = (
 
 
 def _of(done: Cells, contestant: str, wrong: str) -> list[CellResult]:
-    """Return the cells by seed; the learner does not depend on the planners' errors, so it was run once for both."""
+    """Return the cells (results of single runs) of a contestant in which the model of `wrong` is wrong, sorted by seed.
+
+    The learner uses no planner's model.  So its runs of "planners" are valid for "nothing" too, and are returned for both.
+    """
     wanted = {"contestant": contestant, "wrong": HIDDEN[0] if contestant == "learner" and wrong == WRONG[0] else wrong}
     found = [one for one in done.values() if wanted.items() <= one.cell.settings.items()]
     return sorted(found, key=lambda one: one.cell.seed)
@@ -485,7 +504,10 @@ def plot(done: Cells) -> Any:
 
 
 def _mark_crossover(axes: Any, done: Cells, wrong: str) -> None:
-    """Draw a star on the learner's curve for each peer, at the median number of tries from which the learner is no lower."""
+    """Draw a star on the learner's curve for each planner, at the median of `crossover` over the seeds.
+
+    This is the number of tries from which the learner's success is never again below that of this planner.
+    """
     tries, learner = success(done, "learner", wrong)
     for memory in MEMORIES:
         peer = success(done, memory, wrong)[1]
@@ -500,6 +522,6 @@ def _mark_crossover(axes: Any, done: Cells, wrong: str) -> None:
 EXPERIMENT = Experiment(
     claim="where the models are wrong, a reach learner overtakes a planner that replans after every change",
     source="thesis 5.3, 9.3; aim of this reproduction",
-    method=Sweep(conditions, trial, findings, plot, require=require_ompl),
+    method=Sweep(conditions, trial, findings, plot, require=require_ompl, summary=summary),
     claims=CLAIMS,
 )
