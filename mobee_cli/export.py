@@ -12,7 +12,7 @@ from dataclasses import astuple
 from pathlib import Path
 from typing import Any
 
-from experiments.kit.learning.recorded_transitions import Record, records, stores_of
+from experiments.kit.learning.exploration import Record, records, stores_of
 from mobee.errors import MobeeError
 from mobee.learning.reaching.store import COLUMNS as STEP_COLUMNS
 from mobee.learning.reaching.store import ReachStore, reaching_parts

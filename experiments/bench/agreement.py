@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.bench.mujoco_peer import MujocoPeer
+from experiments.bench.peers import MujocoPeer
 from experiments.bench.scenes import Scene
 from mobee.arrays import Array, Ints
 from mobee.model.model import Model

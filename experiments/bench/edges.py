@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 
 import mobee
-from experiments.bench.calibration import Calibration
-from experiments.bench.timing import medians, one_core, processor_time
+from experiments.bench.timing import Calibration, medians, one_core, processor_time
 from experiments.bench.verdicts import Requirement, report_text, verdict
 from experiments.claims.ch3_roadmaps.trm_tasks import pregrasp
 from experiments.kit.command_line import Progress

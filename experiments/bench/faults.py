@@ -26,8 +26,19 @@ import numpy as np
 from experiments.kit.command_line import Progress
 from experiments.kit.live.faults import VITAL, Fault, FaultInjector, draw, shrunk
 from experiments.kit.live.launch import LaunchFailed
-from experiments.kit.live.observer import Kept, Moment, Observer, compare_transitions, stop_after, survived, too_old, violations
-from experiments.kit.live.system import System, running, wait_for
+from experiments.kit.live.system import (
+    Kept,
+    Moment,
+    Observer,
+    System,
+    compare_transitions,
+    running,
+    stop_after,
+    survived,
+    too_old,
+    violations,
+    wait_for,
+)
 from mobee.robot.load import load_robot
 from services.common.observe import alive
 from services.common.session import open_client

@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from experiments.bench.calibration import Calibration
 from experiments.bench.peers import import_peer
-from experiments.bench.timing import cores_text, one_core, processor_time
+from experiments.bench.timing import Calibration, cores_text, one_core, processor_time
 from experiments.bench.verdicts import Requirement, report_text, verdict
 from experiments.kit.command_line import Progress
 

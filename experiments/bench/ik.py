@@ -10,11 +10,10 @@ from typing import Any, Literal
 import numpy as np
 
 import mobee
-from experiments.bench.calibration import Calibration
 from experiments.bench.ik_rivals import MARKER, MinkPeer, Target, annealing, cma, load_mink, particles, xnes
 from experiments.bench.peers import load_cma
 from experiments.bench.scenes import boxes_world
-from experiments.bench.timing import one_core, processor_time
+from experiments.bench.timing import Calibration, one_core, processor_time
 from experiments.bench.verdicts import Requirement, report_text, verdict
 from experiments.kit.command_line import Progress
 from mobee.arrays import Array
@@ -224,7 +223,7 @@ class Tries:
     reached: list[bool] = field(default_factory=list)
     evaluations: list[int] = field(default_factory=list)
     ms: list[float] = field(default_factory=list)  # processor time
-    standard_ms: list[float] = field(default_factory=list)  # on the standard machine, see calibration.py
+    standard_ms: list[float] = field(default_factory=list)  # on the standard machine, see timing.py
 
     def add(self, solve: Solve, aim: Target, seed: int, speeds: Calibration) -> None:
         """Solve one more target and append the result.  `seed`: for the solver.  `speeds` measures the speed of this machine."""

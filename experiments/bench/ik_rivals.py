@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 
 import mobee
-from experiments.bench.mujoco_peer import load_mujoco
-from experiments.bench.peers import CmaStrategy, import_peer
+from experiments.bench.peers import CmaStrategy, import_peer, load_mujoco
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
 from mobee.roadmap.evolution.search import Restart, Search

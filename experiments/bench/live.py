@@ -4,7 +4,7 @@
 Claim: on two cores the age is at most 2 ticks in 99 of 100 ticks up to 200 Hz, 3 up to 500 Hz and 5 at 1 kHz.  The age of a command is the
 number of ticks between the state from which it was computed and the tick in which the robot obeys it.  Age and jitter are measured by the
 services (the processes of the system).  Ticks in which a part holds (brakes and stands still) are counted separately and have no age.
-Before and after every run, a chain of processes that only do a little fixed work (`calibration.bare_ages`) measures the delay that the
+Before and after every run, a chain of processes that only do a little fixed work (`timing.bare_ages`) measures the delay that the
 machine's scheduling causes.  If this delay is k times that of the standard machine, the allowed ages are k times larger.  Run time: 30 s
 (`seconds`) and a start for every rate, on a machine that does nothing else.
 """
@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.bench.calibration import bare_ages
+from experiments.bench.timing import bare_ages
 from experiments.kit.command_line import Progress
 from experiments.kit.live.launch import summary_of
 
@@ -64,7 +64,7 @@ def judged_run(rate: int, summary: Mapping[str, Any], bare_p99: float) -> dict[s
 
     The age of a command is the number of ticks from the state from which it was computed to the tick in which the robot obeys it.  `rate`:
     rate of the control loop [Hz].  `summary`: the summary of the run.  `bare_p99`: 99th percentile of the ages [ticks] of a chain of
-    processes that do nothing but fixed work (`calibration.bare_ages`), measured before and after the run.
+    processes that do nothing but fixed work (`timing.bare_ages`), measured before and after the run.
 
     Main keys: "age_p50", "age_p99" and "age_max", ages [ticks]; "jitter_ms_p50" and "jitter_ms_p99", jitter of the controller's period
     [ms]; "at_most", the largest allowed "age_p99", None above 1 kHz; "passed", whether "age_p99" is at most this.

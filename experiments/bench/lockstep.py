@@ -16,7 +16,7 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any
 
-from experiments.bench.calibration import Calibration, Crew
+from experiments.bench.timing import Calibration, Crew
 from experiments.kit.command_line import Progress
 from experiments.kit.live.launch import summary_of
 

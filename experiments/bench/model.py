@@ -22,10 +22,9 @@ from typing import Any
 import numpy as np
 
 from experiments.bench.agreement import DEPTH_TOLERANCE, MIN_OVERLAP, Agreement, agreements
-from experiments.bench.calibration import Crew
-from experiments.bench.mujoco_peer import MujocoPeer, load_mujoco
+from experiments.bench.peers import MujocoPeer, load_mujoco
 from experiments.bench.scenes import ICUB, MAKERS, MIXED, OBJECTS, PLAIN, Scene, boxes_world, upper_body, upper_body_poses, upper_body_scene
-from experiments.bench.timing import Contestant, cores_text, one_core, rates
+from experiments.bench.timing import Contestant, Crew, cores_text, one_core, rates
 from experiments.bench.verdicts import Requirement, requirement_lines, verdict
 from experiments.kit.command_line import Progress
 from mobee.arrays import Array

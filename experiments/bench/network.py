@@ -31,10 +31,8 @@ from bus_schema.authority import AGENT, party_of
 from experiments.bench.faults import BACK_AT_MOST, NOISE, QUIET
 from experiments.kit.command_line import Progress
 from experiments.kit.live.launch import LaunchFailed, stop
-from experiments.kit.live.network import FIRST, Network, inside
-from experiments.kit.live.observer import Moment, Observer, compare_transitions, stop_after, too_old, violations
-from experiments.kit.live.system import wait_for
-from experiments.kit.live.wire import Faults
+from experiments.kit.live.network import FIRST, Faults, Network, inside
+from experiments.kit.live.system import Moment, Observer, compare_transitions, stop_after, too_old, violations, wait_for
 from mobee.robot.load import load_robot
 from services.common.identity import Identity, assume
 from services.common.session import open_client

@@ -16,9 +16,8 @@ from typing import Any
 import numpy as np
 
 import mobee
-from experiments.bench.calibration import Calibration
-from experiments.bench.mujoco_peer import load_mujoco, us_per_tick
-from experiments.bench.timing import cores_text, medians, one_core, some_cores
+from experiments.bench.peers import load_mujoco, us_per_tick
+from experiments.bench.timing import Calibration, cores_text, medians, one_core, some_cores
 from experiments.bench.verdicts import Requirement, report_text, verdict
 from experiments.kit.command_line import Progress
 from mobee import Gains, Lattice, Model, OfflinePlant, ReachTarget, World, advance_together
@@ -149,7 +148,7 @@ class Pace:
     def standard(self, speed: float) -> dict[str, float]:
         """Return two of the rates as they are on the standard machine, the one for which the requirements were set.
 
-        `speed`: the speed of this machine during the run, in multiples of the standard machine's (calibration.py).  Keys:
+        `speed`: the speed of this machine during the run, in multiples of the standard machine's (timing.py).  Keys:
         "standard_times_real_time" and "standard_actions_per_second".
         """
         return {f"standard_{key}": self.numbers[key] / speed for key in ("times_real_time", "actions_per_second")}

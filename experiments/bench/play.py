@@ -4,7 +4,7 @@
 Claim: the web page shows the first action of a curious agent at most 20 s after the command, 5 s of which are learning offline.  Each start
 is a command of its own, with an empty home and an empty working directory, and headless Chromium opens the page as soon as its address is
 printed.  The 3D view is not loaded: without a graphics card the browser would draw it on the processor.  The time without the learning is
-converted to the time that the standard machine (calibration.py) needs.  For this, the speed of this machine is measured by two processes
+converted to the time that the standard machine (timing.py) needs.  For this, the speed of this machine is measured by two processes
 that do the same fixed work (the calibration loop) at the same time.  At the end the system is stopped as by Ctrl-C.  Run time: 25 s per
 robot.
 """
@@ -24,8 +24,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from experiments.bench.calibration import Calibration, Crew
 from experiments.bench.peers import import_peer
+from experiments.bench.timing import Calibration, Crew
 from experiments.bench.verdicts import Requirement, report_text, verdict
 from experiments.kit.command_line import Progress
 from experiments.kit.live.launch import LaunchFailed, free_endpoint, free_port, stop

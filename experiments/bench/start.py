@@ -4,7 +4,7 @@
 Claim: `import mobee` takes at most 0.2 s; import and first pose with its contacts take at most 0.3 s, without the start of Python itself.
 The system of the scenario `default`, without its web page, is ready within 3 s and takes at most 500 MiB (PSS: memory that processes share
 counts once).  The processor times of the library are judged as multiples of the time to import NumPy; in every round, each program runs in
-a new process.  The time of the system is converted to the time on the standard machine (calibration.py): two processes do the calibration
+a new process.  The time of the system is converted to the time on the standard machine (timing.py): two processes do the calibration
 loop at the same time.  Memory is judged in MiB.  Run time: half a minute.
 """
 
@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.bench.calibration import Calibration, Crew
+from experiments.bench.timing import Calibration, Crew
 from experiments.bench.verdicts import Requirement, report_text, verdict
 from experiments.kit.command_line import Progress
 from experiments.kit.live.launch import summary_of

@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 
 import mobee
-from experiments.bench.calibration import Calibration, Crew
-from experiments.bench.timing import some_cores
+from experiments.bench.timing import Calibration, Crew, some_cores
 from experiments.bench.verdicts import Requirement, report_text, verdict
 from experiments.claims.ch3_roadmaps.trm import coverage, reachable, valid
 from experiments.claims.ch3_roadmaps.trm_tasks import PREGRASP_SPACING, pregrasp
@@ -68,7 +67,7 @@ def measure(settings: Settings) -> dict[str, Any]:
     Main keys: "rows", a dict from a method to a dict of measures, each the worst one of all seeds; "reachable", number of reachable points
     with which coverage is computed; "requirements", a list with the dict that `Requirement.judge` returns for each requirement; "passed",
     whether all are met.  The measures are: times [s], "wall_s", "processor_s" and "standard_wall_s" (the wall time converted to the
-    standard machine of calibration.py); number of "vertices"; "evaluations" per vertex; "coverage" (share of the reachable points that are
+    standard machine of timing.py); number of "vertices"; "evaluations" per vertex; "coverage" (share of the reachable points that are
     covered); "largest_hole" (in units of the spacing); share of "valid" vertices; and share of "short_edges" (along which no motor turns
     too far).
     """

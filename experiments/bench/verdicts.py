@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Requirements of benchmarks, the verdict on a result, and the lines of a report that state both.
 
-The judged numbers are ratios, sizes, counts, and times that were converted to the standard machine (calibration.py).  A time as measured on
+The judged numbers are ratios, sizes, counts, and times that were converted to the standard machine (timing.py).  A time as measured on
 this machine is not judged.
 """
 

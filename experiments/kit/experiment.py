@@ -124,7 +124,10 @@ def _by_setting(envelope: Envelope) -> str:
 
 
 def _merged(names: Sequence[str], every: Sequence[str]) -> list[str]:
-    """Return names of settings; where all pairs with the same first name are among them, that name stands for them."""
+    """Shorten a list of names of settings, in which "A / B" is a pair of an outer setting A and an inner setting B.
+
+    If `names` contain all pairs of A that `every`, the names of all settings, contain, then "A" replaces these pairs.
+    """
     firsts = [name.partition(_PAIR)[0] for name in every]
     whole = {first for first in firsts if all(name in names for name, its in zip(every, firsts, strict=True) if its == first)}
     return list(dict.fromkeys(first if (first := name.partition(_PAIR)[0]) in whole else name for name in names))
@@ -246,7 +249,10 @@ class Method(Protocol):
         """
 
     def results(self, folder: Path) -> dict[str, Any]:
-        """Compute the results of a run from the files in its folder that match `kept`; raises InvalidValue if the experiment keeps none."""
+        """Compute the results of a run from the files in its folder.
+
+        Only files that match a pattern in `kept` are read; the repository keeps them.  Raises InvalidValue if the experiment keeps none.
+        """
 
     def figure(self, folder: Path) -> Path:
         """Draw the results of the run in `folder`, and return the path of the picture."""
@@ -257,10 +263,10 @@ class Steps:
     """A `Method` made of functions, for an experiment that is not a sweep.
 
     `add_arguments`, `run`, `figure`, `kept`: as in `Method`.  `recomputed`: function that computes the results from the folder of a run;
-    None for an experiment without claims.  `summary`: function that returns a summary of the values of a cell (a finished part of a run);
-    the raw record (the files kept in the repository) then has the summaries in place of the values.  None: it has the values.  Only for an
-    experiment whose files `kept` are cells.  The results must be the same with the summaries, and the summary of a summary must be equal to
-    it.
+    None for an experiment without claims.  `summary`: function that returns a summary of the values of a cell (a finished part of a run).
+    The raw record, which is the archive of a run in the repository, then has the summaries in place of the values; if `summary` is None, it
+    has the values.  A summary is possible only if the files that match `kept` are cells.  The results must be the same with the summaries,
+    and the summary of a summary must be equal to it.
     """
 
     add_arguments: Callable[[argparse.ArgumentParser], None]
@@ -279,7 +285,11 @@ class Steps:
         return nullcontext(folder) if self.summary is None else reduced_cells(folder, self.summary)
 
     def results(self, folder: Path) -> dict[str, Any]:
-        """Compute the results of a run from the files in its folder that match `kept`; raises InvalidValue if `recomputed` is None."""
+        """Compute the results of a run from the files in its folder, by the function `recomputed`.
+
+        Only the files kept in the repository (those that match `kept`) are read.  Raises InvalidValue if `recomputed` is None: the
+        experiment has no claims.
+        """
         if self.recomputed is None:
             raise InvalidValue(f"{folder}: this experiment has no claims, and keeps no record from which its results are computed.")
         return self.recomputed(folder)

@@ -2,7 +2,8 @@
 """Write mobee/robot/robots/icub_2014.xml, the iCub model published with MoBeE in 2014.
 
 Source: the entries mobee_original (only numbers, no text, of the repository kailfrank/MoBeE) and shoulder_constraints.mobee_2014 of
-DATA.json.
+DATA.json.  write_icub uses the functions at the end, too: those that add constraints and elements to XML, and format numbers and the
+orientation of boxes.  The file format is described in mobee/robot/robots/README.md.
 
 Usage: python -m experiments.robots.write_icub_2014 DATA.json [OUT.xml]
 """
@@ -17,10 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from experiments.robots.write_icub import add_constraints
-from experiments.robots.xml_writer import box_turn, element, number, vector, write
 from mobee.arrays import Array
-from mobee.robot.xml.node import VERSION
+from mobee.robot.xml.node import VERSION, write_tree
+from mobee.robot.xml.volume import Y, angle_about, height_and_angle
 
 OUT = Path(__file__).parents[2] / "mobee/robot/robots/icub_2014.xml"
 HEADING = """
@@ -76,7 +76,7 @@ def main(data_path: str, out: str | Path = OUT) -> None:
     element(root, "ignore", first="root_link", second="chest", role="field")
     for node in tree.children(None):
         add_node(torso, tree, node)
-    write(root, Path(out), HEADING)
+    write_tree(root, Path(out), HEADING)
 
 
 def declare_motors(parent: ET.Element, tree: Tree, part: str) -> None:
@@ -172,6 +172,56 @@ def add_shape(parent: ET.Element, shape: dict[str, Any], point: Array) -> None:
     else:
         turn = vector("hx hy hz", np.array(shape["axis_root"]))
         element(parent, "cylinder", radius=shape["radius"], height=shape["height"], **attributes, **turn)
+
+
+def add_constraints(parent: ET.Element, data: dict[str, Any]) -> None:
+    """Add the clauses of an arm, as in MoBeE 2014, to the XML element `parent` of the arm's part.
+
+    A clause is a condition on several motors of the arm, which the shoulder's cables and the forearm impose.
+    """
+    for clause in data["shoulder_constraints"]["mobee_2014"]["full_cnf_per_arm"]:
+        rows = element(parent, "constraintList")
+        for row in clause:
+            used = [(a, q) for a, q in zip(row["a"], row["motor_indices"], strict=True) if a]
+            factors, motors = " ".join(number(a) for a, _ in used), " ".join(str(q) for _, q in used)
+            element(rows, "constraint", a=factors, q=motors, b=row["b"])
+
+
+def number(value: float, digits: int = 7) -> str:
+    """Return a number as the shortest text with at most `digits` decimals."""
+    text = f"{value:.{digits}f}".rstrip("0").rstrip(".")
+    return "0" if text in ("-0", "") else text
+
+
+def element(parent: ET.Element, tag: str, **attributes: str | float) -> ET.Element:
+    """Add a child element with this tag and these attributes to `parent`, and return it; numbers become text."""
+    texts = {name: value if isinstance(value, str) else number(value) for name, value in attributes.items()}
+    return ET.SubElement(parent, tag, texts)
+
+
+def vector(names: str, values: Array, digits: int = 7) -> dict[str, str]:
+    """Return XML attributes with the components of a vector that are not zero, by name.
+
+    `names`: names of the components, separated by spaces, as "px py pz".  `values`: the components.  `digits`: largest number of decimals.
+    """
+    texts = {name: number(value, digits) for name, value in zip(names.split(), values, strict=True)}
+    return {name: text for name, text in texts.items() if text != "0"}
+
+
+def box_turn(rotation: Array) -> dict[str, str]:
+    """Return the XML attributes of a box with the orientation `rotation` (3, 3), root frame: hx, hy, hz (height axis) and angle [deg].
+
+    Attributes with the default value are left out.
+    """
+    left, _, right = np.linalg.svd(rotation)
+    exact = left @ right
+    axis, _ = height_and_angle(exact)
+    turn = {} if np.allclose(axis, Y, atol=1e-7) else vector("hx hy hz", axis)
+    written = np.array([float(turn.get(name, 0.0)) for name in ("hx", "hy", "hz")]) if turn else Y
+    if exact[1, 1] * axis[1] < 0:
+        exact = exact * np.array([1.0, -1.0, -1.0])  # the same box
+    angle = np.rad2deg(angle_about(written / np.linalg.norm(written), exact))
+    return turn if abs(angle) < 1e-5 else turn | {"angle": number(float(angle), 6)}
 
 
 if __name__ == "__main__":

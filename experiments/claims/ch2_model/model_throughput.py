@@ -28,7 +28,7 @@ from experiments.claims.ch2_model.model_throughput_threads import MovingModel, O
 from experiments.kit.command_line import Progress, positive_number, positive_whole
 from experiments.kit.experiment import Experiment, Steps
 from experiments.kit.plots import new_figure, saved
-from experiments.kit.records import Records, read_records
+from experiments.kit.run_folder import Records, read_records
 from mobee import Model, World, load_robot
 from mobee.errors import InvalidValue
 

@@ -20,7 +20,7 @@ import numpy as np
 from experiments.claims.ch2_model.model_throughput_threads import Box, MovingModel, Oscillator, fast_thread_switching, random_boxes
 from experiments.kit.command_line import Progress
 from experiments.kit.plots import new_figure
-from experiments.kit.records import Records
+from experiments.kit.run_folder import Records
 from mobee import InvalidValue, Model, World, load_robot
 from mobee.model import Geometry, WorldObject, box
 from mobee.model.core_tables import CODES, VOLUME, Volumes
@@ -201,7 +201,7 @@ def torn_table(snapshot: Snapshot) -> str | None:
 
 
 def _rows_of_boxes(boxes: list[WorldObject]) -> Volumes:
-    """Compute the rows (N,) of boxes independently of the checked code."""
+    """Compute the rows (N,) that boxes have in the core's table of volumes, independently of the code that is checked."""
     rows = np.zeros(len(boxes), dtype=VOLUME)
     if not boxes:
         return rows

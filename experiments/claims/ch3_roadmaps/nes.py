@@ -106,7 +106,11 @@ def tasks(runs: Runs) -> list[Task]:
 
 
 def _fewer(name: str, runs: Runs) -> tuple[str, bool | None]:
-    """Judge whether a strategy needs fewer evaluations than CMA-ES on one task or more; each comparison counts (Bonferroni)."""
+    """Judge whether the strategy `name` needs fewer evaluations than CMA-ES on at least one task.
+
+    Returns a text, and the verdict: True if it needs significantly fewer on a task, False if significantly more on every task, else None.
+    The confidence intervals are widened for the number of tasks (Bonferroni).
+    """
     pairs = {task: (runs[name, task], runs["cma", task]) for task in tasks(runs)}
     spans = {task: ratio_interval(*pair, level_of_each(len(pairs))) for task, pair in pairs.items()}
     found = [task for task, span in spans.items() if span[1] < 1.0]
@@ -119,7 +123,10 @@ def _fewer(name: str, runs: Runs) -> tuple[str, bool | None]:
 
 
 def _medians(name: str, runs: Runs) -> Array:
-    """Return the evaluations over those of CMA-ES from the same start, median over the tasks, (seeds,)."""
+    """Return, for each seed, the median over the tasks of a strategy's evaluations divided by those of CMA-ES, (seeds,).
+
+    Both searches of a ratio have the same seed and thus the same start point.
+    """
     medians: Array = np.median([runs[name, task] / runs["cma", task] for task in tasks(runs)], axis=0)
     return medians
 

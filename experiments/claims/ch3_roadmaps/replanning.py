@@ -46,9 +46,9 @@ from experiments.claims.ch3_roadmaps.replanning_live import (
 from experiments.kit.command_line import Progress, positive_whole
 from experiments.kit.experiment import OUR_AIM, Experiment, Measured, Steps, claim, judged
 from experiments.kit.live.launch import PHYSICS, add_backend, launch, read_done, write_job
-from experiments.kit.live.recordings import CONTACTS, POSITIONS, read_positions, read_touches
+from experiments.kit.live.system import CONTACTS, POSITIONS, read_positions, read_touches
 from experiments.kit.plots import finish, new_figure
-from experiments.kit.structs import decoded, encoded
+from experiments.kit.run_folder import decoded, encoded
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
 from mobee.rendering.sheet import Motion, Strip, filmstrip
@@ -184,7 +184,10 @@ def keep_poses(folder: Path) -> None:
 
 
 def _kept_poses(folder: Path) -> Mapping[str, Array]:
-    """Return the poses that `keep_poses` saved for the first launch of a run that has them."""
+    """Return the poses that `keep_poses` saved, from the first launch with such a file; `folder`: of the run.
+
+    The keys are the names `q`, `times`, `solid` and `bump` (see `keep_poses`).  Raises InvalidValue if no launch has the file.
+    """
     found = sorted(folder.glob(f"launch-*/{POSES}"))
     if not found:
         raise InvalidValue(f"{folder} has no launch-*/{POSES}, from which the filmstrip is drawn: begin a new run without --resume.")
@@ -212,7 +215,11 @@ def _measured(crossing: Crossing, q: Array, deepest: float) -> Measures:
 
 
 def _turned(q: Array, bump: int, vertex: int, ended: int) -> int:
-    """Return the ticks from a bump until the arm is nearest to a vertex; row k - 2 of q (T, n) rad is the beginning of tick k."""
+    """Return the number of ticks from `bump` until the arm is nearest to a vertex, before tick `ended`.
+
+    `q`: (T, n) rad, postures of the recording; row k - 2 is the posture at the beginning of tick k.  `bump`: tick at which the arm touched
+    the ball.  `vertex`: number of the goal that the arm was approaching then.
+    """
     space = new_map().space
     arm = q[:, robot().parts[PART].slice][:, space.columns]
     return int(np.linalg.norm(arm[bump - 2 : ended - 2] - space.samples[vertex], axis=1).argmin())

@@ -27,11 +27,11 @@ from typing import Any
 import numpy as np
 
 from experiments.kit.cells import CELL_FILES, load_cells
+from experiments.kit.control.measures import is_listed
 from experiments.kit.control.plant_runs import place
-from experiments.kit.control.safety import is_listed
 from experiments.kit.experiment import OUR_AIM, Experiment, Measured, Steps, claim, judged
 from experiments.kit.live.launch import TABLE, launch
-from experiments.kit.live.recordings import CONTACTS, POSITIONS, read_touches
+from experiments.kit.live.system import CONTACTS, POSITIONS, read_touches
 from experiments.kit.plots import new_figure, saved
 from experiments.kit.rules import decides, within
 from experiments.kit.run_folder import read, write
@@ -245,7 +245,11 @@ def explore_live(folder: Path, seed: int, most: int | None) -> None:
 
 
 def _touched(launches: Sequence[Path]) -> dict[str, Any]:
-    """Return the duration and the solid contacts of the launches from their recordings of every tick."""
+    """Return the duration and the solid contacts of the launches (starts of the live system) from their recordings of every tick.
+
+    Keys: "hours", robot time; "touches", number of solid contacts; "deepest", depth of the deepest one [m], 0 without contacts; "pair", the
+    names of its two shapes.
+    """
     row = 8 * len(robot().motors)
     ticks = sum((place / POSITIONS).stat().st_size // row for place in launches if (place / POSITIONS).exists())
     touches = [touch for place in launches if (place / CONTACTS).exists() for touch in read_touches(place / CONTACTS, 1.0 / RATE)]
@@ -283,10 +287,11 @@ def findings(found: Cells, live: Mapping[str, Any] | None = None) -> dict[str, A
     """Return the results of the explorations: one offline for each seed, and the live one.
 
     Keys: "maps", a dict from "seed N" or "live" to the measures of this roadmap, as a dict; "claims", a list with the judged claims, as
-    dicts (`Claim.record`).  The measures are "finished"; "minutes" of robot time; the numbers of "edges", of "tried" and of "feasible"
-    edges; the number of random poses that were never reached ("samples_not_come_to"); the number of "repairs"; "agree", the share of the
-    tried edges that had the same result in another try; and the depth of the deepest solid contact ("deepest_mm").  `live`: the result of
-    `read_live`; None: not explored live.
+    dicts (`Claim.record`).  The measures are "finished", whether all reachable edges were tried; "minutes" of robot time; the numbers of
+    "edges", of "tried" and of "feasible" edges; the number of random poses that were never reached ("samples_not_come_to"); "repairs", the
+    number of paths that a planner has added to the map; "agree", the share of the tried edges that had the same result in another try
+    (None without tried edges); and the depth of the deepest solid contact ("deepest_mm").  `live`: the result of `read_live`; None:
+    not explored live.
     """
     results = sorted(found.values(), key=lambda result: result.cell.seed)
     rows = {f"seed {result.cell.seed}": _row(result.values) for result in results}
@@ -424,7 +429,10 @@ SWEEP = Sweep(conditions, trial, findings, plot, add_options=add_options, requir
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Explore the roadmaps that are not in `folder` yet; with --live also the first seed's map on the live robot.  Returns the results."""
+    """Explore the roadmaps that are not in `folder` yet; with --live also the first seed's map on the live robot.
+
+    Returns a dict with the keys "maps" and "claims"; see `results`.
+    """
     SWEEP.run(arguments, folder)
     if arguments.live:
         explore_live(folder / "live", arguments.seed, QUICK if arguments.quick else None)

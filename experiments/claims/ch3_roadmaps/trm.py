@@ -33,8 +33,8 @@ from experiments.claims.ch3_roadmaps.trm_tasks import EXAMPLES
 from experiments.kit.cells import Cell, CellResult, load_cells
 from experiments.kit.experiment import OUR_AIM, Experiment, Measured, Steps, claim, judged
 from experiments.kit.roadmap_task import Example, Method, build
+from experiments.kit.run_folder import encoded
 from experiments.kit.statistics import estimate
-from experiments.kit.structs import encoded
 from experiments.kit.sweep import Cells, run_cells, sweep_arguments
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
@@ -351,7 +351,10 @@ def _figures() -> list[str]:
 
 
 def _least(shares: Mapping[str, Mapping[str, float]]) -> str:
-    """Return the smallest share of each method, by task, as text."""
+    """Return a text with the smallest share of each method, in percent, and the task that has it.
+
+    `shares`: a dict from the method to a dict from the task to a share, 0 to 1.
+    """
     worst = {method: min(each.items(), key=lambda item: item[1]) for method, each in shares.items()}
     return "; ".join(f"{NAMES[method]}: at least {100.0 * share:.1f} % ({task})" for method, (task, share) in worst.items())
 

@@ -102,7 +102,10 @@ def caption_of(coordinates: Sequence[Coordinate], y: Array) -> str:
 
 
 def _near(roadmap: Roadmap, y: tuple[float, ...]) -> int:
-    """Return the vertex nearest to task coordinates, at any distance."""
+    """Return the index of the vertex nearest to the task coordinates `y` (m,).
+
+    Each coordinate difference is divided by the spacing of the roadmap in this coordinate; there is no maximum distance.
+    """
     return int(np.linalg.norm((roadmap.y - y) / roadmap.spacing, axis=1).argmin())
 
 

@@ -216,7 +216,12 @@ def _put_box(model: Model, x: float, y: float, floor: float) -> None:
 def _turned(
     model: Model, title: str, figure: str, width: float, across: tuple[int, int, int], most: float, view: View, via: Via
 ) -> Example:
-    """Return an example in which both hands turn an object about a direction: parallel palms, the middle between them stays."""
+    """Return an example in which both hands hold an object between parallel palms and turn it about an axis, at a fixed place.
+
+    `width`: distance of the palms [m].  `across`: direction of the axis, root frame; the normals of the palms stay perpendicular to it.
+    `most`: the task coordinate, the angle of the right palm's normal about the axis, goes from -most to most [rad].  `view` and `via`: see
+    `Example`.
+    """
     middle = (-0.30, 0.0, 0.20)  # m
     between_palms(model, mobee.box(0.12, 0.12 if view == "front" else 0.16, width - 0.05), width)
     terms = [*held(width), costs.position(RIGHT, middle, tolerance=0.01, offset=(0.0, 0.0, 0.5 * width)), costs.across(RIGHT, across)]

@@ -40,7 +40,7 @@ from experiments.claims.ch4_reflex.babbling_trial import (
 from experiments.kit.command_line import Progress, positive_number
 from experiments.kit.experiment import Experiment, Steps
 from experiments.kit.live.launch import add_backend
-from experiments.kit.live.recordings import POSITIONS, Touch
+from experiments.kit.live.system import POSITIONS, Touch
 from experiments.kit.plots import new_figure, saved
 from mobee import load_robot
 from mobee.errors import InvalidValue
@@ -103,7 +103,11 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 def _run_until_repeatable(place: Path, mode: str, robot: Robot, seed: int, ticks: int, show: Callable[[float], None], backend: str) -> None:
-    """Repeat a trial until no process was late for a tick; raises TrialFailed."""
+    """Run a trial, and repeat it until no process was late for a tick; then write its measurements to the folder `place`.
+
+    `ticks`: duration of the trial.  `show`: is called with the finished share of the trial, 0 to 1.  Raises TrialFailed if a process was
+    late in each of 3 attempts.
+    """
     for _ in range(MAX_ATTEMPTS):
         run_trial(place, mode, robot, seed, ticks, show, backend)
         trial = measure(place, robot, 1.0 / RATE)
@@ -353,7 +357,11 @@ def _smoothness(axes: Any, rows: Rows) -> None:
 
 
 def _bars(bars: Callable[..., Any], rows: Rows, heights: list[list[int]]) -> None:
-    """Draw a bar for each mode at every place; `bars`: bar or barh of some axes."""
+    """Draw grouped bars: a group for each category, such as a pair of solids, and in it one bar for each mode.
+
+    `bars`: the method `bar` or `barh` of matplotlib axes.  `rows`: a dict with the modes as keys.  `heights`: for each mode, in the order
+    of `rows`, a list with the height of its bar in each group.
+    """
     width = 0.8 / len(rows)
     for i, (mode, values) in enumerate(zip(rows, heights, strict=True)):
         shift = (i - (len(rows) - 1) / 2.0) * width

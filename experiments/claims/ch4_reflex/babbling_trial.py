@@ -12,8 +12,8 @@ import numpy as np
 from msgspec import Struct
 
 from experiments.kit.live.launch import PHYSICS, TABLE, summary_of
-from experiments.kit.live.recordings import CONTACTS, POSITIONS, Touch, read_positions, read_touches
-from experiments.kit.structs import decoded, encoded
+from experiments.kit.live.system import CONTACTS, POSITIONS, Touch, read_positions, read_touches
+from experiments.kit.run_folder import decoded, encoded
 from mobee.arrays import Array
 from mobee.errors import MobeeError
 from mobee.robot.robot import Robot
@@ -310,7 +310,12 @@ def judge(commanded: Commanded, q_all: Array, robot: Robot, dt: float) -> Judged
 
 
 def _outcome(left: float, gone: float) -> Outcome:
-    """Return the outcome of a part from its remaining error and its distance from the start, rad."""
+    """Return the outcome of a command for one part of the robot, such as an arm.
+
+    `left`: largest distance of a motor from its target at the end of the command [rad].  `gone`: largest distance of a motor from its
+    start [rad].  The outcome is "completed" if `left` is at most 10 degrees, else "returned" if `gone` is at most 5 degrees, else
+    "deflected".
+    """
     if left <= REACHED:
         return "completed"
     return "returned" if gone <= RETURNED else "deflected"

@@ -126,7 +126,12 @@ class Table:
         return None
 
     def _edge(self, touching: Array, position: Array, rotation: Array, heading: float) -> Spot | None:
-        """Return the spot at which contact begins, by bisection of a step."""
+        """Return the spot at which the contact begins, by bisection of the height of the hand.
+
+        `touching`: posture (n,) rad in which the hand touches the table; one step higher (STEP) it did not.  `position` (3,) m and `rotation`
+        (3, 3): pose of the hand in this posture, root frame.  `heading`: horizontal direction of the paths through the spot, angle [rad] from
+        the x axis.  Returns None if the arm cannot reach one of the heights with this rotation.
+        """
         low, high, q = position[2], position[2] + STEP, touching
         for _ in range(8):
             middle = np.array([*position[:2], 0.5 * (low + high)])
@@ -153,7 +158,11 @@ class Table:
         return HandPath(postures, len(up))
 
     def _line(self, q: Array, spot: Spot, positions: list[Array]) -> list[Array] | None:
-        """Return postures with the hand at the positions, oriented as at the spot; None without a posture, or with another contact."""
+        """Return for each of the positions, (3,) m, root frame, a posture (n,) rad with the palm there, oriented as at the spot.
+
+        `q`: a posture near the first of them; each search starts at the posture before.  Returns None if a posture is not found, or has a
+        violation other than contacts of the left arm with the table.
+        """
         found = []
         for position in positions:
             solved = self._solve(q, position, spot.rotation)

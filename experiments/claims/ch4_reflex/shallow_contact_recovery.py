@@ -12,7 +12,8 @@ table in which the fields of the hand, volumes that are not solid, overlap the t
 it gets control back.  The motors have lag, delay, play and encoder noise; a tick is 10 ms.  Variants: off = no reflex; naive = MoBeE 1.0 as
 chapter 4.1 describes it; mended = with filter and dead time; 2.0 = the client's references are attractors of the controller.  The first
 recovery of each trial counts.  It succeeds if the hand ends without contact, did not touch again or sink deeper while it moved back, and
-the next reflex does not start within 0.3 s.  It is clean if in addition the encoders reported no contact during the motion back.
+the next reflex does not start within 0.3 s after the client has got control back.  It is clean if in addition the encoders reported no
+contact during the motion back.
 """
 
 from __future__ import annotations
@@ -187,8 +188,9 @@ class Trial:
 
     Of the first recovery, `again`: a contact came back, by the encoders; `came_back`: the same by the true positions; `never`: the hand was
     still in contact at the end of the recovery or of the trial; `deeper`: the hand was more than 1 mm deeper while it moved back than while
-    it stopped; `relapse`: the next reflex started within 0.3 s.  `settled`: whether the arm settled, for variant "2.0".  `progress`:
-    largest distance [m] of the hand from the start of the straight approach, along the table.
+    it stopped; `relapse`: the second reflex started within 0.3 s after the first one gave control back to the client.  `settled`: whether
+    the arm came to rest after the client's last reference, only for the variant "2.0"; False for the others.  `progress`: largest distance
+    [m] of the hand from the start of the straight approach, along the table.
     """
 
     variant: str
@@ -333,7 +335,11 @@ def _switch(table: Table, client: Client, body: _Body, truth: Truth, settings: R
 
 
 def _deflect(table: Table, client: Client, body: _Body, truth: Truth) -> bool:
-    """Run MoBeE 2.0, with the client's references as attractors; returns whether the arm settled after the last one."""
+    """Run the controller of MoBeE 2.0 for 12 s, with the client's position references as attractors, and record each tick in `truth`.
+
+    Returns True if the left arm settled after the last reference, that is, if its commanded speed and acceleration fell below the
+    thresholds of `Settle` before the timeout.
+    """
     controller = Controller(table.model, Gains.default(), speed_scale=SPEED)
     controller.reset(client.start)
     track, command = table.model.track(), np.zeros(len(client.start))

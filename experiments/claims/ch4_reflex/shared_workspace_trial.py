@@ -74,7 +74,7 @@ class Client:
         self._begin, self._move = k, PositionMove(here, self.next(), self._speed)
 
     def is_over(self, k: int) -> bool:
-        """Whether the present move and the rest of 1 s after it have ended in tick `k`."""
+        """Whether tick `k` is after the end of the present move and of the pause of 1 s that follows it."""
         return (k - self._begin) * DT >= self._move.duration + REST
 
     def reference(self, k: int) -> Array:

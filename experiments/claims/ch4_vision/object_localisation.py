@@ -179,7 +179,11 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def _with_things(robot: Robot, gazes: int) -> dict[str, Any]:
-    """Return, for each thing, errors (N,) m, normalised errors (N,), relative errors of sizes (N, g); the box's angles (N,) rad; counts."""
+    """Show the things in `gazes` random postures, and return the part of the result of `trial` that is about them.
+
+    Its keys are "NAME_error", "NAME_normalised" and "NAME_size" for each thing NAME, "box_angle", "shown" and "taken_for_another"; see
+    `trial` for their shapes and units.
+    """
     rows: dict[str, list[tuple[float, float, Array]]] = {name: [] for name in KINDS}
     angles: list[float] = []
     wrong = 0

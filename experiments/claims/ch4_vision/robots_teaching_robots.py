@@ -133,7 +133,11 @@ def _calibrated(postures: int, seed: int) -> Array:
 
 
 def _learned(name: str, lessons: Lessons, test: Lessons, seed: int) -> Array:
-    """Return the errors (N,) m of a localiser on the test, after it has learned from lessons."""
+    """Train a localiser, and return the distances (N,) m of its computed ball positions from the true ones in `test`.
+
+    A localiser is a method that computes the position of the ball from both pictures and the encoders; `name` is one of LEARNED.
+    `lessons`: the labelled samples for the training.  `test`: N other samples.  `seed`: of the localiser's random numbers.
+    """
     one = localiser(name, rig(), seed)
     one.fit(lessons.inputs, lessons.reported)
     return _off(one.predict(test.inputs), test)

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Constraint violations: a search for the arm command that violates most the constraints of shoulder cables and forearm.
 
-Claim: with the default gains no attractors (poses to which the control law pulls the arm), inside or far outside the motors' ranges, held
-or in any sequence, carry an arm more than 2 degrees beyond a constraint on several joints (at least one of its inequalities a.q + b > 0
-must hold), measured along the normal, -(a.q + b)/|a|.  The fastest impact of a motor at a hard stop is reported too.  Source: this
-project's goal; the constraints are those of thesis 5.2.5.  Published: no number; the thesis says of positional constraints that their
-forces may grow without bound, "but this never happens in practice".  Run time: 10 000 tries for both gain sets and 2000 with forces of a
-client, a few minutes.
+Claim: with the default gains no attractors (poses to which the control law pulls the arm) carry an arm more than 2 degrees beyond a
+constraint on several joints.  The attractors may be inside or far outside the motors' ranges, held or in any sequence.  A constraint holds
+if at least one of its inequalities a.q + b > 0 holds; the distance beyond an inequality is measured along its normal, -(a.q + b)/|a|.  The
+fastest impact of a motor at a hard stop is reported too.  Source: this project's goal; the constraints are those of thesis 5.2.5.
+Published: no number; the thesis says of positional constraints that their forces may grow without bound, "but this never happens in
+practice".  Run time: 10 000 tries for both gain sets and 2000 with forces of a client, a few minutes.
 
 A try is one command of one arm: a start, three attractors, and the duration of each attractor.  A forced try has in addition, for each
 attractor, a force in configuration space and one at the palm.  Both arms try at once while the torso moves to a random posture, with a
@@ -26,8 +26,8 @@ import numpy as np
 
 from experiments.kit.command_line import positive_whole
 from experiments.kit.control.arm_commands import ARMS, Command, Tried, as_numbers, from_numbers, random_command, try_commands, vary
+from experiments.kit.control.measures import clause_label, clause_violations
 from experiments.kit.control.plant_runs import COLORS, GAINS, icub_at_table
-from experiments.kit.control.safety import clause_label, clause_violations
 from experiments.kit.experiment import Experiment
 from experiments.kit.plots import new_figure
 from experiments.kit.sweep import Cells, Condition, Sweep
@@ -70,12 +70,13 @@ class Search:
 
     A violation is the distance beyond the constraint in degrees, along its normal, negative inside; the attributes have the largest
     violations so far.  A generation is a group of up to 100 tries that are drawn in the same manner.  `gains`: name of the gain set.
-    `forced`: whether a client pushes.  `seed`: of the tries.  `tries`: number so far.  `worst`: largest violation.  `by_clause`: largest
-    violation of each clause of an arm.  `stop`: fastest impact of a joint at a hard stop [deg/s].  `course`: pairs of the number of tries
-    and the largest violation so far.  `inside`: for each generation, the largest violation of those of its tries whose attractors are all
-    within the motors' ranges.  `random`: for each generation of random tries, its largest violation.  Both lists have -360 as a first
-    element and for a generation without such tries.  `elite`: for each clause, a list of the worst commands (at most 8), as pairs of the
-    violation and the command as numbers.  `worst_try`: commands, torso posture, seed, arm and clause of the worst try, to repeat it.
+    `forced`: whether a client of the controller also applies forces to the arms.  `seed`: of the tries.  `tries`: number so far.  `worst`:
+    largest violation.  `by_clause`: largest violation of each clause of an arm.  `stop`: fastest impact of a joint at a hard stop [deg/s].
+    `course`: pairs of the number of tries and the largest violation so far.  `inside`: largest violation in each generation, only from
+    tries whose attractors (the commanded postures) are all within the motors' ranges; -360 if the generation has no such try.  `random`:
+    largest violation in each generation of random tries.  Both lists begin with an additional -360.  `elite`: for each clause, a list of
+    the worst commands (at most 8), worst first, as pairs of the violation and the command as numbers.  `worst_try`: commands, torso
+    posture, seed, arm and clause of the worst try, to repeat it.
     """
 
     gains: str
@@ -124,7 +125,10 @@ def search(gains: str, forced: bool, tries: int, seed: int) -> Search:
 
 
 def _next(rng: np.random.Generator, state: Search) -> Command:
-    """Return a variation of a bad command for a clause: with probability 1/2 the most violated clause, else any."""
+    """Return a new command: a random variation of one of the commands (at most 8) with the largest violations of a clause so far.
+
+    The clause is, with probability 1/2, the one with the largest violation, and else a random one.
+    """
     clause = int(np.argmax(state.by_clause)) if rng.random() < 0.5 else int(rng.integers(CLAUSES))
     known = state.elite[clause]
     one, other = (known[int(rng.integers(len(known)))][1] for _ in range(2))

@@ -22,11 +22,11 @@ from typing import Any
 
 import numpy as np
 
+from experiments.kit.control.measures import clause_violations, deepest, limit_violations, oscillation
 from experiments.kit.control.plant_runs import COLORS, GAINS, PERIOD, PUSHES, icub, icub_at_table, place, run_plant
-from experiments.kit.control.safety import clause_violations, deepest, limit_violations, oscillation
 from experiments.kit.experiment import Experiment
 from experiments.kit.plots import new_figure
-from experiments.kit.records import rounded
+from experiments.kit.run_folder import rounded
 from experiments.kit.sweep import Cells, Condition, Sweep
 from mobee import Gains
 from mobee.arrays import Array

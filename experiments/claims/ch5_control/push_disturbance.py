@@ -21,11 +21,11 @@ from typing import Any
 
 import numpy as np
 
+from experiments.kit.control.measures import AT_STOP, clause_violations, deepest, limit_violations, speeds_at_stops
 from experiments.kit.control.plant_runs import COLORS, PERIOD, icub_at_table, run_plant
-from experiments.kit.control.safety import AT_STOP, clause_violations, deepest, limit_violations, speeds_at_stops
 from experiments.kit.experiment import Experiment
 from experiments.kit.plots import new_figure
-from experiments.kit.records import rounded
+from experiments.kit.run_folder import rounded
 from experiments.kit.sweep import Cells, Condition, Sweep, grid, grouped_by
 from mobee import Gains
 from mobee.arrays import Array

@@ -22,11 +22,11 @@ from typing import Any
 import numpy as np
 
 from experiments.kit.command_line import positive_number, positive_whole
+from experiments.kit.control.measures import motor_step, postures, run_step, step_response
 from experiments.kit.control.plant_runs import COLORS, GAINS, PERIOD, icub
-from experiments.kit.control.step_responses import motor_step, postures, run_step, step_response
 from experiments.kit.experiment import Experiment
 from experiments.kit.plots import new_figure
-from experiments.kit.records import rounded
+from experiments.kit.run_folder import rounded
 from experiments.kit.sweep import Cells, Condition, Sweep
 from mobee import Gains
 from mobee.arrays import Array

@@ -32,7 +32,7 @@ from experiments.kit.cells import CellResult
 from experiments.kit.experiment import OUR_AIM, Claim, Experiment, Measured, Rule, claim, judged
 from experiments.kit.learning.arm import arm_plant, arm_space, robot
 from experiments.kit.learning.exploration import explore
-from experiments.kit.learning.truth import Truth, l1, truth_of, walk
+from experiments.kit.learning.outcomes import Truth, l1, truth_of, walk
 from experiments.kit.plots import new_figure
 from experiments.kit.rules import all_hold, decides, is_above, of_each, row, texts
 from experiments.kit.statistics import estimate, interval

@@ -29,7 +29,7 @@ import numpy as np
 from experiments.kit.experiment import OUR_AIM, Claim, Experiment, Measured, judged
 from experiments.kit.learning.arm import RANK3, RANK4, arm_plant, arm_space
 from experiments.kit.learning.exploration import begin_nearby, explore
-from experiments.kit.learning.truth import CERTAIN, Truth, model_error, most_likely, sampling_error, truth_of, walk
+from experiments.kit.learning.outcomes import CERTAIN, Truth, model_error, most_likely, sampling_error, truth_of, walk
 from experiments.kit.plots import finish, new_figure
 from experiments.kit.rules import decides, within
 from experiments.kit.statistics import interquartile_mean, ratio_estimate, ratio_interval

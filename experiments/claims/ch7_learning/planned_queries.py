@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from experiments.kit.control.plant_runs import place
 from experiments.kit.learning.arm import JOINTS, PART, arm_clauses, arm_plant, clear, whole
 from experiments.kit.learning.arm_planners import NEIGHBOURS, Belief, PlannedOnce, Repaired, Rival, make_roadmap, with_goals
-from experiments.kit.wrapped_plant import WrappedPlant
+from experiments.kit.plants import WrappedPlant
 from mobee import Lattice, OfflinePlant, Outcome, World, box
 from mobee.arrays import Array
 from mobee.errors import MobeeError

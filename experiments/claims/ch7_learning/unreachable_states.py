@@ -30,11 +30,11 @@ from experiments.kit.experiment import Envelope, Experiment, Measured, claim, ju
 from experiments.kit.learning.arm import RANK4, STRETCHED, arm_plant, arm_space
 from experiments.kit.learning.exploration import begin_anywhere, explore
 from experiments.kit.learning.outcomes import ends_of, exists_in, goals_of, outcome_counts, tries_of, uncertain_in, visits_of
+from experiments.kit.plants import WrappedPlant
 from experiments.kit.plots import new_figure
 from experiments.kit.rules import decides, of_each, rises, texts
 from experiments.kit.statistics import estimate, interval, mean_over, ratio_interval
 from experiments.kit.sweep import Cells, Condition, Sweep, runs_by
-from experiments.kit.wrapped_plant import WrappedPlant
 from mobee import CuriousAgent, Lattice, OfflinePlant, Outcome
 from mobee.arrays import Array, Ints
 from mobee.control.gains import SettleTest

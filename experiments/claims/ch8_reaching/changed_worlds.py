@@ -45,8 +45,7 @@ from experiments.kit.experiment import OUR_AIM, Claim, Experiment, Measured, jud
 from experiments.kit.learning.arm import RIGHT, robot, table_world
 from experiments.kit.learning.exploration import begin_anywhere, explore
 from experiments.kit.plots import draw_curve, finish, new_figure, ticks_at
-from experiments.kit.reaching.arm import MARKER, TRANSITIONS, Errors, JudgedPlant, laws, reach_space
-from experiments.kit.reaching.seen_hand import SeenHand
+from experiments.kit.reaching.arm import MARKER, TRANSITIONS, Errors, JudgedPlant, SeenHand, laws, reach_space
 from experiments.kit.reaching.targets import grid, targets_at
 from experiments.kit.reaching.truth import BLOCKED, Known, Truth, failed_transitions, remaining_errors
 from experiments.kit.rules import decides, equivalent, row

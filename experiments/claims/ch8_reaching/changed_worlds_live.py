@@ -54,7 +54,7 @@ from experiments.claims.ch8_reaching.changed_worlds import (
     claims_of_each_change,
     errors_after,
 )
-from experiments.claims.ch8_reaching.live_reach.hand import Hand
+from experiments.claims.ch8_reaching.live_reach.contestants import Hand
 from experiments.claims.ch8_reaching.live_reach.problems import (
     GAINS,
     RATE,
@@ -71,8 +71,7 @@ from experiments.kit.experiment import MIN_SEEDS, Experiment, Measured, judged
 from experiments.kit.learning.arm import RIGHT
 from experiments.kit.live.launch import TABLE, add_backend, append_done, launch, read_done, read_job, write_job
 from experiments.kit.plots import finish, new_figure, ticks_at
-from experiments.kit.reaching.arm import MARKER, PART, JudgedPlant
-from experiments.kit.reaching.seen_hand import SeenHand
+from experiments.kit.reaching.arm import MARKER, PART, JudgedPlant, SeenHand
 from experiments.kit.reaching.truth import Truth, failed_transitions, load_truth, oracle, remaining_errors
 from experiments.kit.rules import decides
 from experiments.kit.statistics import estimate, interval
@@ -105,7 +104,7 @@ PERFORM = "experiments.claims.ch8_reaching.changed_worlds_live:perform"
 class TrueHand(Hand):
     """The live arm, whose reaches are judged by the simulator's true joint positions.
 
-    It is also a `seen_hand.Judge`: it can judge the reaches of a plant that acts through it and corrects its encoders.
+    It is also a `experiments.kit.reaching.arm.Judge`: it can judge the reaches of a plant that acts through it and corrects its encoders.
     """
 
     def __init__(self, service: Service, robot: Robot) -> None:
@@ -342,8 +341,9 @@ Runs = Mapping[str, list[dict[str, Any]]]  # by change
 def runs_of(found: Cells) -> Runs:
     """Return a dict from the change of the world to the results of the learner's runs after it, sorted by seed.
 
-    A result has from each array that `trial` returns only the row of this change, (L,); and under "oracle" the score of the agent that
-    knows the changed world.  A change is left out until the run of its oracle has finished.
+    A result is a dict.  Under each key of `trial` it has the numbers after this change, (2,): directly after it, and after the live tries.
+    Under "oracle" it has the score of the agent that knows the changed world.  A change is left out until the run of its oracle has
+    finished.
     """
     learners = [one for one in found.values() if one.cell.settings["runs"] == "learner"]
     others = [one for one in found.values() if one.cell.settings["runs"] == "oracle"]
@@ -395,7 +395,10 @@ def _row(runs: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def _compared(runs: list[dict[str, Any]], of: Callable[[list[dict[str, Any]]], Array], digits: int) -> tuple[str, Array]:
-    """Return the numbers of the learner after its tries, (N,), and a text with these and those directly after the change."""
+    """Return a measure of N runs as text, directly after the change and after the live tries, and the numbers after the live tries, (N,).
+
+    `of`: function that computes the measure of the runs at both times, (N, 2), as `relative` or `failures`.
+    """
     before, after = of(runs).T
     few = "" if len(after) >= MIN_SEEDS else f" ({len(after)} runs, too few for a verdict)"
     return f"{estimate(after, digits)}; directly after the change {estimate(before, digits)}{few}", after

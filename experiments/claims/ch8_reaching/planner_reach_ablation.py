@@ -128,7 +128,11 @@ def means(groups: Groups, law: str, scene: str, method: str, measure: str) -> Ar
 
 
 def _together(law: str, groups: Groups) -> Measured:
-    """Compare both together with the reach alone: the planner alone does not reach for the target."""
+    """Judge whether planner and reach together achieve more than the reach alone, for each scene.
+
+    The planner alone is not compared, because it does not reach for the target.  `law`: the control law of the runs.  Returns a text with
+    the means of both methods, and the verdict for each scene.
+    """
     if law not in groups:
         return "not measured", None
     pairs = {scene: [means(groups, law, scene, method, MEASURE[law]) for method in ("reach", "both")] for scene in SCENES}

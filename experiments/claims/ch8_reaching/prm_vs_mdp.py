@@ -115,7 +115,11 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def _rivals(settings: dict[str, Any], seed: int, scene: Scene, lattice: Lattice) -> Iterator[tuple[str, Rival, float]]:
-    """Yield rivals with their names and costs before the first query: hours of plant time, or thousands of poses checked."""
+    """Yield the compared planners of one kind (straight, MDP or roadmaps) as name, planner, and cost before the first query.
+
+    The cost is the plant time of learning [h] for the MDP, the thousands of poses that were checked for roadmaps, and 0 for straight
+    motions.
+    """
     if "learned" in settings:
         plant = arm_plant(seed + 500, world=world_of(scene.balls))
         agent = CuriousAgent(lattice, plant, seed=seed)
@@ -190,7 +194,11 @@ def make_scene(seed: int, queries: int) -> Scene:
 
 
 def _balls(rng: np.random.Generator) -> Array:
-    """Return positions of the palm in random poses between the lattice's outer samples, where a ball does not touch the robot at home."""
+    """Return the positions of the centres of the balls, (BALLS, 3) m, in the root frame.
+
+    Each is the position of the palm in a random pose of the arm between the lattice's outermost samples.  A position is used only if a
+    ball there has no contact with the robot at home.
+    """
     low, high = robot().limits[columns()].T
     alone = Model(robot())
     found: list[Array] = []
@@ -203,7 +211,11 @@ def _balls(rng: np.random.Generator) -> Array:
 
 
 def _queries(seed: int, rng: np.random.Generator, balls: Array, count: int) -> tuple[Array, Ints, NDArray[np.bool_]]:
-    """Move straight from sample to sample; choose queries among these motions, whose goals were reached at least once."""
+    """Move straight between random samples of the lattice, and choose half of the queries from the motions that failed, half from others.
+
+    The goal of each query was reached by at least one motion.  Returns the first poses (Q, J) rad, the goals (Q,) as states of the lattice,
+    and whether the straight motion failed, (Q,).  Raises InvalidValue if there is no query of one of the two kinds.
+    """
     lattice = space()
     plant = arm_plant(seed, world=world_of(balls))
     free = [s for s in range(len(lattice)) if not len(plant.model.evaluate(whole(lattice.samples[s])).table)]
@@ -368,13 +380,20 @@ def findings(found: Cells) -> dict[str, Any]:
 
 
 def _falls_short(roadmap: Row, learned: Row) -> bool | None:
-    """Return whether the roadmap does not work well in hard queries, and the MDP does better; False where the roadmap works well."""
+    """Return whether the roadmap does not work well (success below 95 %) in hard queries, and the MDP has more successes in these.
+
+    None if the confidence intervals over the seeds do not decide.
+    """
     short = decides(interval(roadmap.numbers["hard"]), most=MIN_SUCCESS)
     return False if short is False else all_hold([short, is_above(learned.numbers["hard"], roadmap.numbers["hard"])])
 
 
 def _in_wrong_models(rows: Rows, rival: str) -> Measured:
-    """Judge a roadmap with each wrong model."""
+    """Judge whether a roadmap planner does not work well in hard queries and the MDP does better, for each kind of wrong model.
+
+    `rival`: name of the planner.  Returns a text with the success of both, and the verdict by the kind of errors in the model (`WRONG`):
+    True, False or None (open).
+    """
     learned = row_of(rows, "MDP, 4000 learned", "")
     roadmaps = {belief: row_of(rows, rival, belief) for belief in WRONG}
     each = (f"{belief} {roadmaps[belief].text('hard')}" for belief in BELIEFS[1:])

@@ -55,8 +55,9 @@ class Runs:
     def agreement(self, checkpoint: int) -> Array:
         """Return how well the choices of states of each run agree with those of the other runs, (N,), from 0 to 1.
 
-        Two runs agree by the sum, over the states, of the smaller one of their shares in `chosen`; a run's result is the mean over the
-        other runs.  `checkpoint`: number of problem-tries (attempts to reach one target) before the evaluation, one of `checkpoints`.
+        The agreement of two runs is the overlap of their shares of reaches by state (`chosen`): for each state the smaller share is taken,
+        and these are added.  The result of a run is its mean agreement with the other runs.  `checkpoint`: number of problem-tries
+        (attempts to reach one target) before the evaluation, one of `checkpoints`.
         """
         chosen = self.chosen(checkpoint)
         overlaps = np.minimum(chosen[:, None], chosen[None]).sum(axis=-1)

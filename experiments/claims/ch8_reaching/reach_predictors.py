@@ -222,7 +222,10 @@ Evaluated = tuple[Fractions, list[int]]  # and after how many problem-tries
 
 
 def _columns(found: Evaluated, name: str, checkpoint: int) -> list[Array | None]:
-    """Return the fractions of the recommended and of the published predictor; None where that was not run."""
+    """Return the score divided by the oracle's after `checkpoint` problem-tries, for the recommended and for the published predictor.
+
+    Each is an array (seeds,), or None if there is no result for this predictor or checkpoint.  `name`: the set of targets.
+    """
     curves, at = found
     known = (curves[one, name] if (one, name) in curves and checkpoint in at else None for one in (RECOMMENDED, PUBLISHED))
     return [None if curve is None else curve[:, at.index(checkpoint)] for curve in known]
@@ -290,7 +293,10 @@ def plot(found: Found) -> Any:
 
 
 def _curve(axes: Any, at: list[int], curve: Array, learner: str, color: str, style: str) -> None:
-    """Draw interquartile means, and the intervals of the recommended and the published predictor."""
+    """Draw the interquartile mean over the seeds as a curve; for the recommended and the published learner its interval as a band, too.
+
+    `at`: numbers of problem-tries, (L,).  `curve`: fractions of the oracle's score, (seeds, L).
+    """
     middle = [interquartile_mean(column) for column in curve.T]
     axes.plot(at, middle, style, color=color, label=learner, linewidth=2.2 if learner in (RECOMMENDED, PUBLISHED) else 1.0)
     if learner in (RECOMMENDED, PUBLISHED):

@@ -206,7 +206,10 @@ def _poses_at_cup(part: str, rng: np.random.Generator) -> Array:
 
 
 def _sound_pairs(both: PeerBelief, arms: list[Array], rng: np.random.Generator) -> Array:
-    """Return valid poses of both arms (K, 12) rad, in the world; raises InvalidValue if none is found."""
+    """Combine random poses of each arm, and return those pairs (K, 12) rad that are valid in the world: see `PeerBelief.sound`.
+
+    `arms`: poses of each arm, (N, 6) rad, in the order of SIDES.  Raises InvalidValue if no pair is valid.
+    """
     if all(len(arm) for arm in arms):
         pairs = np.concatenate([arm[rng.integers(len(arm), size=PAIRS)] for arm in arms], axis=1)
         found: Array = pairs[both.sound(pairs)]

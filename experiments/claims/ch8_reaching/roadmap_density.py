@@ -187,14 +187,18 @@ def walked(roadmap: Roadmap, query: Query, mode: str) -> Walk:
 
 
 def _around(roadmap: Roadmap, vertex: int) -> set[Edge]:
-    """Return the edges that end within AROUND of a vertex, by the position of the palm."""
+    """Return the edges with at least one end near a vertex: the palm is at most AROUND [m] from its position at this vertex."""
     near = np.linalg.norm(roadmap.y - roadmap.y[vertex], axis=1) <= AROUND
     touched: Ints = roadmap.edges[near[roadmap.edges].any(axis=1)]
     return {(a, b) for a, b in touched.tolist()}
 
 
 def _executed(roadmap: Roadmap, queries: list[Query], walks: list[Walk]) -> dict[str, Any]:
-    """Execute the path of the first query around its cup; returns the palm's error at its end and the depth of solid contacts [m]."""
+    """Execute the path of the first query around its cup, and return two results of `trial`, "off" and "solid", both in m.
+
+    "off" is the distance of the palm from its planned position at the end, "solid" the depth of the deepest contact of solids; NaN if there
+    is no path to the goal.
+    """
     query, walk = queries[0], walks[0]
     path = roadmap.graph.shortest(query.start, query.goal, query.blocked) if walk.arrived else None
     if path is None:

@@ -27,7 +27,8 @@ import numpy as np
 
 from experiments.kit.experiment import Envelope, Experiment, Measured, claim, judged
 from experiments.kit.learning.exploration import begin_anywhere
-from experiments.kit.learning.truth import Truth, l1, truth_of, walk
+from experiments.kit.learning.outcomes import Truth, l1, truth_of, walk
+from experiments.kit.plants import WrappedPlant
 from experiments.kit.plots import draw_curve, finish, new_figure
 from experiments.kit.reaching.arm import MARKER, learned_beliefs, reach_plant, reach_space
 from experiments.kit.reaching.learning import LEARNERS
@@ -35,7 +36,6 @@ from experiments.kit.reaching.targets import grid, targets_at
 from experiments.kit.rules import all_hold, decides, rises
 from experiments.kit.statistics import estimate, interval
 from experiments.kit.sweep import Cells, Condition, Sweep, grouped
-from experiments.kit.wrapped_plant import WrappedPlant
 from mobee import TransitionModel
 from mobee.arrays import Array, Ints
 from mobee.learning.reaching.reach_agent import ReachAgent
@@ -179,8 +179,9 @@ class _Beliefs:
 def findings(found: Cells) -> dict[str, Any]:
     """Return the results: "variants" is a list with a row for each variant, "claims" a list with the judged claims, as dicts.
 
-    A row is a dict of text: "variant", "problem-tries" (attempts to reach one target), "failed transitions", and "score" and "L1 error"
-    after numbers of actions.  The claims are absent if a variant has no run.
+    A row is a dict of text: "variant", "problem-tries" (attempts to reach one target), "failed transitions", and for each evaluation that
+    all runs have, "score after N actions" and "L1 error after N actions" (error of the transition model).  The claims are absent if a
+    variant has no run.
     """
     runs = runs_of(found)
     results: dict[str, Any] = {"variants": [_row(variant, group) for variant, group in runs.items()]}
@@ -197,7 +198,8 @@ def are_complete(runs: Mapping[str, Runs]) -> bool:
 def runs_of(found: Cells) -> dict[str, Runs]:
     """Return a dict from each variant to its runs, sorted by seed.
 
-    The model errors of the runs are NaN if no walk is finished, because the walks measure the true outcomes.
+    Model errors are differences from true outcomes, which are measured by random walks through the states (the runs "walk" of `trial`).
+    They are NaN if `found` has no such run.
     """
     walks = [values["seen"] for values in grouped(found, "variant", [WALK]).get(WALK, [])]
     truth = truth_of(reach_space(), np.concatenate(walks).astype(np.intp)) if walks else None

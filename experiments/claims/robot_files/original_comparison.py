@@ -27,7 +27,8 @@ class Comparison:
     """Differences between two readings of a robot file: by this library, and by the rules of the MoBeE program of 2014.
 
     `poses`: number of compared poses.  `position_error`: largest distance between the positions of a volume's centre or a marker [m].
-    `rotation_error`: largest difference of a component of a unit vector: normals of markers, height axes of volumes and axes of boxes.
+    `rotation_error`: largest difference of a component of a unit vector, for normals of markers and axes of boxes; and 1 - |cos| of the
+    angle between the height axes of cylinders.
     Counts of differences, 0 if the readings agree: `pairs`, pairs of volumes that only one reading tests; `base`, volumes that only one
     reading tests against the world; `clauses`, clauses (constraints on several joints) that hold in a pose by one reading only; `contacts`,
     contacts that only one reading finds.  `all_contacts`: number of all contacts, in all poses.
@@ -90,14 +91,20 @@ def _degrees(robot: Robot, q: Array) -> dict[str, float]:
 
 
 def _placed(program: Program, robot: Robot, volumes: list[tuple[Node, Volume, str]], q: Array) -> tuple[Array, Array]:
-    """Return centres (v, 3) and orientations (v, 3, 3) of the program's volumes."""
+    """Return the centres (v, 3) m and rotation matrices (v, 3, 3) of the volumes by the rules of the program, in the root frame.
+
+    `q`: one pose (n,) rad.
+    """
     at = program.poses(_degrees(robot, q))
     centres = np.array([at[node][:3, :3] @ volume.position + at[node][:3, 3] for node, volume, _ in volumes])
     return centres.reshape(-1, 3), np.array([at[node][:3, :3] @ volume.rotation for node, volume, _ in volumes]).reshape(-1, 3, 3)
 
 
 def _shapes(robot: Robot, q: Array) -> tuple[Array, Array]:
-    """Return centres (v, 3) and orientations (v, 3, 3) of this library's shapes."""
+    """Return the centres (v, 3) m and rotation matrices (v, 3, 3) of the robot's shapes as this library reads them, in the root frame.
+
+    `q`: one pose (n,) rad.
+    """
     transforms = link_transforms(robot, q)
     at = [transforms[shape.link] for shape in robot.shapes]
     centres = np.array([link[:3, :3] @ shape.position + link[:3, 3] for link, shape in zip(at, robot.shapes, strict=True)])
@@ -132,7 +139,10 @@ def _matched(program: Program, robot: Robot, volumes: list[tuple[Node, Volume, s
 
 
 def _pairs(program: Program, volumes: list[tuple[Node, Volume, str]], role: str) -> list[tuple[int, int]]:
-    """Return the pairs of volumes that the program tests."""
+    """Return the pairs of volumes that the program tests for contacts, as indices in `volumes`.
+
+    `role`: "solid" or "field"; both volumes of a pair have this role.
+    """
     ignored = program.ignored()[0 if role == "solid" else 1]
     mine = [k for k, one in enumerate(volumes) if one[2] == role]
     return [
@@ -144,7 +154,10 @@ def _pairs(program: Program, volumes: list[tuple[Node, Volume, str]], role: str)
 
 
 class _PoseComparison:
-    """Compares poses one by one, and keeps the largest differences and the counts."""
+    """Compares the two readings of a robot file in one pose after another, and keeps the largest differences and the counts.
+
+    One reading is by this library, the other by the rules of the MoBeE program of 2014.  The fields are as in `Comparison`.
+    """
 
     def __init__(
         self,
@@ -162,7 +175,7 @@ class _PoseComparison:
         self.clauses = self.contacts = self.all_contacts = 0
 
     def compare(self, q: Array) -> None:
-        """Compare one pose (n,) rad."""
+        """Compare the two readings in one pose `q` (n,) rad, and add the differences to the fields of this object."""
         degrees = _degrees(self.robot, q)
         centres, turns = _placed(self.program, self.robot, self.volumes, q)
         mine, mine_turned = (one[self.order] for one in _shapes(self.robot, q))
@@ -216,7 +229,10 @@ def _radius(volume: Volume) -> float:
 
 
 def _rotation_difference(volume: Volume, theirs: Array, mine: Array) -> float:
-    """Return the difference of two orientations of a volume, apart from its symmetries."""
+    """Return the difference of two orientations (3, 3) of a volume, without unit; 0 if they differ only by a symmetry of the volume.
+
+    Cylinder: 1 - |cos| of the angle between the height axes.  Box: largest difference of a component of the axes.  Sphere: 0.
+    """
     if volume.kind == "sphere":
         return 0.0
     if volume.kind == "cylinder":  # the program's axis is y, ours z
@@ -225,7 +241,11 @@ def _rotation_difference(volume: Volume, theirs: Array, mine: Array) -> float:
 
 
 def _object(volume: Volume, centre: Array, turn: Array, less: float = 0.0) -> _Placed:
-    """Return a volume for coal, smaller by at most `less` [m]."""
+    """Return a volume as a shape and a transform for the library coal.
+
+    `centre` (3,) m, `turn` (3, 3): its centre and orientation in the root frame.  Each length in its size becomes shorter by `less` [m],
+    but at most by half.
+    """
     size = [max(length - less, length / 2) for length in volume.size]
     if volume.kind == "sphere":
         shape = coal.Sphere(*size)

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any
 from experiments.claims.robot_files.original_files import Original, find_originals
 from experiments.kit.command_line import Progress, positive_whole
 from experiments.kit.experiment import Experiment, Steps
-from experiments.kit.records import Records, read_records
+from experiments.kit.run_folder import Records, read_records
 from mobee.check import check_file
 from mobee.errors import InvalidValue, MobeeError
 from mobee.model.model import Model
@@ -146,7 +146,7 @@ def _compare(path: Path, robot: Robot, poses: int, seed: int) -> Comparison:
 
 
 def _read_as(path: Path) -> str:
-    """Return the generation of files as which it was read."""
+    """Return the programs (names and years) for which the file was written, as a note of `mobee check` names them; "" without a note."""
     notes = [finding.what for finding in check_file(path).findings if finding.check == "older-version"]
     note = next((text for text in notes if text.startswith("read as")), "")
     return note.removeprefix("read as a file of ").removeprefix("read as a world of ").split(", for ")[0].split(": <")[0]

@@ -29,7 +29,7 @@ import numpy as np
 from experiments.claims.robot_files.sample_robots import ROBOTS, examples_folder, robot_file
 from experiments.kit.command_line import Progress
 from experiments.kit.experiment import Experiment, Steps
-from experiments.kit.records import Records, Row, read_records
+from experiments.kit.run_folder import Records, Row, read_records
 from mobee import CuriousAgent, Lattice, Model, OfflinePlant, load_robot
 from mobee.arrays import Array
 from mobee.check.touching import leave_out_touching
@@ -266,7 +266,10 @@ def arm_of(robot: Robot) -> list[str]:
 
 
 def _explore(urdf: Path, srdf: Path, field: float | None, seed: int) -> tuple[float, int]:
-    """Return the seconds from the file to the end of ACTIONS curious actions, and after how many of them solids were in contact."""
+    """Load a robot and make ACTIONS curious actions; returns the seconds of both, and after how many actions solids were in contact.
+
+    `field`: distance [m] by which the field of each solid (a volume that causes a repulsive force) extends beyond it; None: no fields.
+    """
     start = time.perf_counter()
     robot = load_robot(urdf, srdf=srdf, field=field)
     plant = OfflinePlant(Model(robot), seed)

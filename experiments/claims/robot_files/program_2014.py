@@ -121,7 +121,11 @@ class Program:
                 self._walk(child, node, part, motor, hand)
 
     def _read_clauses(self, root: ET.Element) -> None:
-        """Read the clauses, which count the motors of their part: by idx, else in the order of the file; `negate` as in 2012."""
+        """Read the clauses (constraints on several joints) into `clauses`.
+
+        A clause names motors by numbers within its body part: the attribute idx of the motor, or without it the place in the file.  As in
+        2012, the attribute `negate` reverses the inequality of a row; the program of 2014 ignored it.
+        """
         order: dict[str, dict[int, str]] = {}
         seen = set[str]()
         found: list[tuple[str, ET.Element]] = []
@@ -252,7 +256,7 @@ def axis_angle(axis: Array, angle: float) -> Array:
 
 
 def _first_attributes(text: str) -> str:
-    """Return the text with only the first of equal attributes in every tag, as the program read it."""
+    """Return the XML text without repeated attributes: of attributes with one name in a tag only the first is kept, as by the program."""
 
     def first(tag: re.Match[str]) -> str:
         kept: dict[str, str] = {}

@@ -53,7 +53,7 @@ def _chain() -> str:
 
 
 def _star() -> str:
-    """Return a robot of one-joint arms, spread over a ball of 1 m."""
+    """Return the URDF text of a robot with 300 arms of one joint each, which begin on a sphere of radius 1 m and point outwards."""
     rng = np.random.default_rng(SEED)
     joints = []
     for k in range(STAR_JOINTS):
@@ -119,7 +119,7 @@ def _robot_text(name: str, links: list[str], joints: list[str]) -> str:
 
 
 def _link_text(name: str, length: float) -> str:
-    """Return a rod along z, with a gap to the next link."""
+    """Return the URDF text of a link, a rod along z from its origin, `length` in m; a tenth of it is free at each end."""
     return (
         f'<link name="{name}"><collision><origin xyz="0 0 {length / 2!r}"/>'
         f'<geometry><cylinder radius="{length / 8!r}" length="{0.8 * length!r}"/></geometry></collision></link>'

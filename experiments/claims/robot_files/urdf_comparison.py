@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from experiments.bench.peers import import_peer, make_searches_precise
-from experiments.kit.records import Row
+from experiments.kit.run_folder import Row
 from mobee.arrays import Array
 from mobee.check.interface import Subject
 from mobee.errors import MobeeError
@@ -137,7 +137,11 @@ def _compared(found: FileRecord, path: Path, robot: Robot, poses: int, seed: int
 
 
 def _frame_error(robot: Robot, peer: UrdfPeer, q: Array, angles: Array) -> float:
-    """Return the largest difference between the links' frames; a link that no joint moves is a marker in this library."""
+    """Return the largest difference of an element of a link's frame (4, 4) between this library and Pinocchio, over all poses.
+
+    Links that no joint moves have no frame in this library; their frames are those of its markers.  `q`: the poses, positions of motors
+    (P, n).  `angles`: the same poses, positions of joints (P, J) for `peer`.
+    """
     zero = peer.frames(np.zeros(len(robot.joints)))
     worst = 0.0
     for pose, joints in zip(q, angles, strict=True):
@@ -152,7 +156,10 @@ def _frame_error(robot: Robot, peer: UrdfPeer, q: Array, angles: Array) -> float
 
 
 def _contacts(robot: Robot, owners: list[str], q: Array) -> list[dict[LinkPair, float]]:
-    """Return for each pose the pairs of links of the URDF that touch, and their depths [m]."""
+    """Return for each pose a dict from the pairs of links whose solids touch to the largest depth [m].
+
+    `owners`: name of the URDF link of each shape of the robot.  `q`: the poses, (P, n).
+    """
     table = Model(robot).evaluate(q).table
     found: list[dict[LinkPair, float]] = [{} for _ in q]
     columns = (table.pose, table.first, table.second, table.kind, table.depth)
@@ -171,7 +178,10 @@ class UrdfPeer:
     """The robot of a URDF file as Pinocchio reads it; its methods take joint positions in the order of this library."""
 
     def __init__(self, path: Path, robot: Robot) -> None:
-        """Read the file.  `robot`: the same file as this library reads it.  Raises NotInstalled without Pinocchio, and PeerFailed."""
+        """Read the file.  `robot`: the same file as this library reads it.
+
+        Raises NotInstalled without Pinocchio, and PeerFailed if Pinocchio cannot read the file or does not have all joints of `robot`.
+        """
         pinocchio = import_peer("pinocchio", "Pinocchio", extra="dev")
         self._pin, self._robot, self._path = pinocchio, robot, path.resolve()
         try:
@@ -183,7 +193,11 @@ class UrdfPeer:
         self._columns = self._moving_joints()
 
     def _moving_joints(self) -> list[tuple[int, int]]:
-        """Return the column of each of the robot's joints in the configuration, and its number of columns; set joints without a range."""
+        """Return for each joint of the robot its first column in Pinocchio's configuration vector, and its number of columns.
+
+        The other joints with one column, which this library does not move, get the lower limit of their range in `_neutral`.  Raises
+        PeerFailed if Pinocchio has not all joints.
+        """
         self._neutral = self._pin.neutral(self._model)
         known = {joint.name for joint in self._robot.joints}
         columns = {}

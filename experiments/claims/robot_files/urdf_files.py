@@ -30,7 +30,7 @@ from experiments.claims.robot_files.urdf_comparison import FileRecord, compare_f
 from experiments.kit.command_line import Progress, positive_whole
 from experiments.kit.experiment import Experiment, Steps
 from experiments.kit.plots import new_figure
-from experiments.kit.records import Records, read_records
+from experiments.kit.run_folder import Records, read_records
 from mobee.errors import InvalidValue
 
 RECORDS = "urdf-files.csv"
@@ -129,7 +129,10 @@ def _installed() -> Iterator[tuple[str, Path]]:
 
 
 def _files(folders: dict[str, Path], only: str) -> Iterator[tuple[str, Path]]:
-    """Yield the name, which is ASCII, and the path of every file."""
+    """Yield a label and the path of every URDF file in `folders`, which are given by name; files in SKIPPED_FOLDER are left out.
+
+    The label is the folder's name, "/" and the path below the folder, in ASCII.  `only`: text that the label must contain.
+    """
     for name, folder in folders.items():
         for path in sorted(folder.rglob("*.urdf")):
             below = path.relative_to(folder)

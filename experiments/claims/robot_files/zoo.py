@@ -28,7 +28,7 @@ from typing import Any
 from experiments.claims.robot_files.urdf_files import SKIPPED_FOLDER, named_folders
 from experiments.kit.command_line import Progress, positive_number
 from experiments.kit.experiment import Experiment, Steps
-from experiments.kit.records import Records, Row, read_records
+from experiments.kit.run_folder import Records, Row, read_records
 from mobee import CuriousAgent, Derived, Model, OfflinePlant, derive, load_robot
 from mobee import run as run_agents
 from mobee.check.run import check_robot

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from experiments.kit.control.measures import clause_violations, speeds_at_stops
 from experiments.kit.control.plant_runs import PERIOD, PlantRun, icub_at_table, place, run_plant
-from experiments.kit.control.safety import clause_violations, speeds_at_stops
 from mobee import Controller, Gains
 from mobee.arrays import Array
 from mobee.robot.robot import Robot
@@ -75,7 +75,8 @@ def random_command(rng: np.random.Generator, forced: bool) -> Command:
 def vary(rng: np.random.Generator, one: Command, other: Command) -> Command:
     """Return the command `one` with small random changes.
 
-    In 30 % of the cases, each phase of `one` is first replaced, with probability 0.5, by the same phase of the command `other`.
+    A command has three phases, each with a duration, an attractor and forces.  In 30 % of the cases, each phase of `one` is first replaced,
+    with probability 0.5, by the same phase of the command `other`.
     """
     step = rng.choice(STEPS)
     take = rng.random(PHASES) < (0.5 if rng.random() < 0.3 else 0.0)

@@ -109,7 +109,7 @@ def _marker(marker: str, direction: tuple[float, float, float]) -> Push:
 
 
 def _both(x: float, y: float, z: float) -> Push:
-    """Push both palms, mirrored in y."""
+    """Return a push of both palms: along (x, y, z) in the root frame at the left palm, along (x, -y, z) at the right palm."""
 
     def push(controller: Controller, force: float) -> None:
         controller.push("left_palm", force * np.array([x, y, z]))
@@ -128,7 +128,7 @@ def _motors(part: str, sign: float) -> Push:
 
 
 def _together(*pushes: Push) -> Push:
-    """Apply several pushes at the same time."""
+    """Return a push that applies all the given pushes at the same time."""
 
     def push(controller: Controller, force: float) -> None:
         for each in pushes:

@@ -7,9 +7,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from experiments.kit.cup.approaches import RrtPlanner, ready, roadmap, robot, roomy_placement, side_grasp
-from experiments.kit.cup.learned import by_learner
-from experiments.kit.cup.scene import (
+from experiments.kit.cup.approaches import (
     CUP,
     FALLEN,
     HEIGHT,
@@ -18,11 +16,18 @@ from experiments.kit.cup.scene import (
     TOP,
     Eyes,
     Placement,
+    RrtPlanner,
+    by_learner,
+    ready,
+    roadmap,
+    robot,
+    roomy_placement,
+    side_grasp,
     standing,
     table,
     true_world,
 )
-from experiments.kit.physics_plant import PhysicsPlant
+from experiments.kit.plants import PhysicsPlant
 from mobee import Model
 from mobee.arrays import Array
 from mobee.behaviours.grasp import palm_beside
@@ -157,7 +162,10 @@ class Trial:
         )
 
     def _goals(self, thing: Upright, azimuth: float) -> list[Array]:
-        """Return places for the cup without seen clutter near them."""
+        """Return places (2,) m, root frame, to which the cup `thing` can be moved, without seen clutter near them.
+
+        `azimuth`: direction that the palm faced in the grasp, rad, as in `places_near`, which states the order of the places.
+        """
         places = places_near(thing.place, azimuth, SHIFTS, GOALS, np.random.default_rng([self._seed, 437]))
         others = [item.position[:2] for name, item in self._planned.world.objects.items() if name not in ("table", CUP)]
         clear = [place for place in places if all(np.linalg.norm(place - other) > 0.09 for other in others)]

@@ -2,8 +2,8 @@
 """The published learners: robot, plants, state spaces and agents of thesis chapter 7 and paper section 3, and poses of the left arm.
 
 The robot is `icub_2014` with the gains published in 2014 and a control period of 20 ms; its motors are the plant's defaults
-(docs/plant.md).  Motors that take no part in learning do not move.  Those of the arms are in the middle of their range, where the goals of
-the actions have them, too; all others are at home.
+(docs/plant.md).  Motors that take no part in learning do not move.  Those of the arms stay in the middle of their range, which is also
+their position in the goals of the actions; all others stay at home.
 """
 
 from __future__ import annotations
@@ -148,7 +148,7 @@ def clear(model: Model, q: Array, clauses: Sequence[Clause]) -> NDArray[np.bool_
     """Return which poses q (P, 4) rad of the left arm are clear, (P,): nothing touches, and no cable constraint is near.
 
     Neither solids nor fields (the larger volumes that cause repulsive forces) may touch.  `model`: the robot in its world.  `clauses`: the
-    cable constraints that count; each must be at least `min_margin` away.
+    cable constraints that count; the largest a.q + b [rad] of each must be at least the value that `min_margin` returns.
     """
     poses = whole(q)
     good = np.ones(len(poses), dtype=bool)

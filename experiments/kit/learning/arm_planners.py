@@ -232,7 +232,10 @@ class Straight:
         self._goal = goal
 
     def aim(self, q: Array) -> Array | None:
-        """Return the sample of the goal state, (4,) rad, which is the pose that stands for this state; it does not depend on q."""
+        """Return the pose (4,) rad that stands for the goal state, its sample in the lattice; never None.
+
+        `q` is not used.
+        """
         sample: Array = self._space.samples[self._goal]
         return sample
 
@@ -294,7 +297,10 @@ class Repaired:
         self.repairs = 0
 
     def begin(self, goal: int) -> None:
-        """Start a query for the state `goal`, as in `Rival.begin`; unless `remembers` is set, removed motions are available again."""
+        """Start a query for the state `goal`, as in `Rival.begin`.
+
+        The motions that were removed in earlier queries because they failed are used again, unless `remembers` is set.
+        """
         self._goal, self._at = self._vertex_of[goal], None
         if not self._remembers:
             self._out.clear()
@@ -327,7 +333,11 @@ class Repaired:
         self.repairs += 1
 
     def _path(self, q: Array) -> list[int] | None:
-        """Return the remaining vertices; the goal vertex is passed again if the robot is near it but not in the goal's cell."""
+        """Return the remaining vertices of the cheapest path to the goal, without removed motions; None if there is no path.
+
+        At the goal vertex a query does not end until the robot is in the goal's cell: the path then starts at vertices near q, as off the
+        roadmap, and may pass the goal vertex again.
+        """
         roadmap = self._roadmap
         if self._at is not None and self._at != self._goal:
             path = roadmap.path({self._at: 0.0}, self._goal, self._out)
@@ -353,7 +363,7 @@ class Learned:
         self._goal = goal
 
     def aim(self, q: Array) -> Array | None:
-        """Plan the next action from the pose q (4,) rad, and return the sample of its goal state, a pose (4,) rad.
+        """Plan the next action from the pose q (4,) rad, and return the sample of its goal state, a pose (4,) rad; never None.
 
         The sample of a state is the pose that stands for it.  The planned action is remembered for the next call of `observe`.
         """

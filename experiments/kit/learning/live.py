@@ -316,7 +316,7 @@ class Contacts:
         return cls(int(missed.sum()), int(touched.sum()), int((missed & touched).sum()), len(seen))
 
     def __add__(self, other: Contacts) -> Contacts:
-        """Return the sum of each number."""
+        """Return the counts of both objects together: each field is the sum of the two fields."""
         return Contacts(*(mine + others for mine, others in zip(astuple(self), astuple(other), strict=True)))
 
 

@@ -159,7 +159,7 @@ def push_to(stage: Stage, goals: Sequence[int], tries: int, most: int, beliefs: 
 
 
 def _begin(stage: Stage, rng: np.random.Generator) -> int:
-    """Move the arm to random postures until the cup can stand at its first place; returns the state."""
+    """Move the arm to random postures until the cup can stand at its first place; returns the index of the present state of stage.space."""
     while True:
         stage.plant.act(PART, stage.space.postures.target(int(rng.integers(len(stage.space.postures)))))
         if stage.cup.put_back():

@@ -37,9 +37,9 @@ class RewardedPlant(TabularPlant):
         self.largest = float(self.truth.max())
 
     def act(self, part: str, target: Array) -> Outcome:
-        """Perform the action with the number `target[1]` in the present state, and record its reward; returns the outcome.
+        """Perform an action in the present state, and record its reward; returns the outcome.
 
-        `part`: as in `mobee.plant.Plant.act`.
+        `part`: as in `mobee.plant.Plant.act`.  `target`: (2,), as the space's `aim` returns it: expected state and number of the action.
         """
         at = self.state, int(target[1])
         outcome = super().act(part, target)
@@ -119,8 +119,9 @@ class RMax:
 class PosteriorSampling:
     """The explorer PSRL (Osband, Russo and Van Roy 2013): plans with a world that is drawn from the posterior.
 
-    A new world is drawn after every `episode` steps.  Outcomes of a state-action: Dirichlet distribution, with the prior count 1 / S of
-    every state.  Rewards: normal distribution with mean 0 and variance 1 before the first try, known after it.
+    A new world is drawn after every `episode` transitions, an argument of the constructor.  Outcomes of a state-action: Dirichlet
+    distribution, with the prior count 1 / S of every state.  Rewards: normal distribution with mean 0 and variance 1 before the first try,
+    known after it.
     """
 
     def __init__(self, plant: RewardedPlant, episode: int) -> None:

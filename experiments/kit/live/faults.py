@@ -148,8 +148,9 @@ class FaultInjector:
     def __init__(self, session: Any, endpoint: str, launcher: int | None = None, epoch: Callable[[], int | None] = lambda: None) -> None:
         """`session`: of Zenoh.  `endpoint`: address of the router.
 
-        `launcher`: process id of the launcher, needed if schedules name it.  `epoch`: returns the number of the present ownership (epoch)
-        of the drive of FORGED_PART ("left_arm"), None if it is not known.
+        `launcher`: process id of the launcher, needed if schedules name it.  `epoch`: function that returns the drive epoch of the part
+        FORGED_PART ("left_arm"), None if it is not known.  The drive epoch is a number that changes with the client that owns (may command)
+        the part; a forged release must contain it.
         """
         self._session, self._endpoint, self._launcher, self._epoch = session, endpoint, launcher, epoch
         self._stops = Bus(session, "faults", logging.getLogger("faults")).publisher(EStop)

@@ -31,7 +31,7 @@ _GARBAGE = b"\xc1" + bytes(99)  # no msgpack
 
 
 def _paced(rate: float, send: Callable[[], object]) -> None:
-    """Call `send` at a rate, without end."""
+    """Call `send` `rate` times a second, in short bursts; never returns."""
     begun, sent = time.monotonic(), 0
     while True:
         due = int((time.monotonic() - begun) * rate)

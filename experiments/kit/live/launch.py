@@ -23,7 +23,7 @@ from typing import Any, TypeVar
 
 from msgspec import Struct
 
-from experiments.kit.structs import decoded, encoded
+from experiments.kit.run_folder import decoded, encoded
 from mobee.errors import MobeeError
 
 _START_TIMEOUT, _END_TIMEOUT = 120.0, 30.0  # s
@@ -86,7 +86,10 @@ def launch_command(scenario: str, endpoint: str, runs: Path, settings: Sequence[
 
 
 def _watched(process: subprocess.Popen[str], watch: Callable[[int], None], seconds: float) -> tuple[str, str]:
-    """Wait for the end of a process and return its output and its errors; raises TimeoutExpired."""
+    """Wait at most `seconds` s for the end of a process, and return the texts of its standard output and its standard error.
+
+    Until then `watch` is called with the process id twice a second.  Raises TimeoutExpired if the process does not end in time.
+    """
     deadline = time.monotonic() + seconds
     while True:
         try:

@@ -99,7 +99,7 @@ class Drawer:
         self.run, self.k, self.t = "-", 0, 0  # of the newest tick
 
     def message(self) -> Drawn:
-        """Draw a message of a random stream of the bus."""
+        """Draw a message of a stream of the bus; the stream is chosen at random."""
         cls = self._random.choice(self._streams)
         part = self._random.choice([*self._parts])
         name = {"part": part}.get(cls.stream.variable) or self._random.choice(NAMES)

@@ -5,7 +5,7 @@ The four joints of the published lattice (the discrete states of the arm) move; 
 `reach_plant` and `learned_beliefs` are the published set-up (thesis 8.3): the robot of 2014, under the published or the default law, with
 actions to the states one level away along one joint.  The functions with an argument `law` (except `reach_plant`) belong to the experiments
 that compare with planners: today's robot under the law "default", or the robot of 2014 under the law "published", with actions to the 16
-nearest states.
+nearest states.  `JudgedSeeingPlant` sees its hand, and so corrects its encoders, while its reaches are judged by the true position.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -21,9 +21,9 @@ import mobee
 from experiments.kit.learning.arm import ARM_NEIGHBOURS, DT, RANK3, RIGHT, arm_space
 from experiments.kit.learning.arm import robot as published_robot
 from experiments.kit.learning.exploration import begin_anywhere, explore
+from experiments.kit.plants import WrappedPlant
 from experiments.kit.reaching.belief import PeerBelief
 from experiments.kit.reaching.learning import LEARNERS
-from experiments.kit.wrapped_plant import WrappedPlant
 from mobee import CuriousAgent, Gains, Lattice, Model, MotorParameters, OfflinePlant, TransitionModel, World
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
@@ -32,6 +32,7 @@ from mobee.learning.value_iteration import OutcomeModel
 from mobee.plant import Outcome
 from mobee.reach import Aim, ReachOutcome, ReachPlant, ReachTarget
 from mobee.robot.robot import Robot
+from mobee.vision.calibration.self_calibration import NOISE, JointOffsets, SelfCalibratingPlant
 
 PART, MARKER = "right_arm", "right_palm"
 TRANSITIONS = 3000  # curious ones, enough to learn the lattice (thesis 7.2.2: 2987)
@@ -300,3 +301,68 @@ class JudgedPlant(WrappedPlant[OfflinePlant]):
 
     def _seen(self, touched: tuple[str, ...]) -> tuple[str, ...]:
         return tuple(name for name in touched if name not in self._unseen)
+
+
+class Judge(ReachPlant, Protocol):
+    """A plant that knows the true position of the hand, and so can judge reaches of plants with wrong encoders.
+
+    `reached`: the true position of the marker at the end of the last reach, (3,) m, root frame.
+    """
+
+    reached: Array
+
+    def marker_at(self, marker: str) -> Array:
+        """Return the true position of the marker now, (3,) m, root frame."""
+        ...
+
+
+class SeenHand:
+    """The hand as a learner sees it, and the errors of the encoders that are estimated from the seen positions.
+
+    `offsets`: estimates the errors of the encoders of some motors.  All plants that `correct` returns share it, so the estimates are kept
+    when a learner gets a new plant.  `is_seen`: whether the hand is seen at present.
+    """
+
+    def __init__(self, robot: Robot, motors: Sequence[str], seed: int) -> None:
+        """`motors`: names of the motors whose offsets are unknown.  `seed`: of the errors of the seen positions."""
+        self.offsets, self.is_seen = JointOffsets(Model(robot), MARKER, motors), True
+        self._rng = np.random.default_rng(seed)
+
+    def see(self, judge: Judge) -> Array | None:
+        """Return the position at which the hand is seen, (3,) m, with a random error of 5 mm along each axis; None if it is not seen."""
+        error = self._rng.normal(0.0, NOISE, 3)
+        return judge.marker_at(MARKER) + error if self.is_seen else None
+
+    def correct(self, judge: Judge) -> JudgedSeeingPlant:
+        """Return a plant whose actions move the plant `judge`, and whose encoder values are corrected.
+
+        The corrections are estimated from the positions at which the hand is seen.  `judge`: the plant with wrong encoders.
+        """
+        return JudgedSeeingPlant(SelfCalibratingPlant(judge, self.offsets, lambda: self.see(judge)), judge)
+
+
+class JudgedSeeingPlant(WrappedPlant[SelfCalibratingPlant]):
+    """A self-calibrating plant whose outcomes of reaches have the true position of the hand and the true remaining error.
+
+    `inner`: the self-calibrating plant.  `judge`: the plant that `inner` moves; it knows the true position of the hand.
+    """
+
+    def __init__(self, inner: SelfCalibratingPlant, judge: Judge) -> None:
+        super().__init__(inner)
+        self._judge, self._target = judge, ReachTarget(np.zeros(3))
+
+    def present(self, target: ReachTarget | None) -> None:
+        """Present a target to the self-calibrating plant, or remove it (None); as in `mobee.reach.ReachPlant.present`.
+
+        The last target is kept, also after None: the true error of a reach is computed from it.
+        """
+        self._target = target or self._target
+        super().present(target)
+
+    def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
+        """Reach as `mobee.reach.ReachPlant.reach` does; the outcome has the true position of the marker and the true error that remains.
+
+        `part`, `marker`, `stay`: as in that method.
+        """
+        found, where = super().reach(part, marker, stay), self._judge.reached
+        return replace(found, marker=where, missing=self._target.missing(where))

@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.bench import calibration
-from experiments.bench.calibration import SPEED_LIFETIME, STANDARD_SECONDS, Calibration, Crew, bare_ages
+from experiments.bench import timing
+from experiments.bench.timing import SPEED_LIFETIME, STANDARD_SECONDS, Calibration, Crew, bare_ages
 
 
 class Clock:
@@ -23,8 +23,8 @@ class Clock:
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     found = Clock()
-    monkeypatch.setattr(calibration.time, "process_time", found)
-    monkeypatch.setattr(calibration.time, "monotonic", found)
+    monkeypatch.setattr(timing.time, "process_time", found)
+    monkeypatch.setattr(timing.time, "monotonic", found)
     return found
 
 
@@ -34,8 +34,8 @@ def test_the_speed_is_that_of_the_median_loop(clock: Clock, monkeypatch: pytest.
     def loop() -> None:
         clock.now += next(seconds)
 
-    monkeypatch.setattr(calibration, "loop", loop)
-    assert calibration.speed(loops=3) == pytest.approx(1.0 / 3.0)
+    monkeypatch.setattr(timing, "loop", loop)
+    assert timing.speed(loops=3) == pytest.approx(1.0 / 3.0)
 
 
 def test_the_speed_is_measured_before_and_after_but_not_too_often(clock: Clock) -> None:
@@ -68,7 +68,7 @@ def test_ages_of_a_bare_chain_count_ticks_since_the_last_answer() -> None:
 
 
 def test_the_newest_of_several_messages_counts() -> None:
-    three = b"".join(calibration._message(tick) for tick in (6, 7, 8))
-    assert calibration._newest_tick(three, 5) == 8
-    assert calibration._newest_tick(three[:-1], 5) == 7  # the last one is not whole yet
-    assert calibration._newest_tick(b"t", 5) == 5
+    three = b"".join(timing._message(tick) for tick in (6, 7, 8))
+    assert timing._newest_tick(three, 5) == 8
+    assert timing._newest_tick(three[:-1], 5) == 7  # the last one is not whole yet
+    assert timing._newest_tick(b"t", 5) == 5

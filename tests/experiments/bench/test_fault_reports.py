@@ -11,7 +11,7 @@ import pytest
 from bus_schema.rpc import Stat
 from experiments.bench import faults, soak, stop
 from experiments.kit.live.faults import Fault
-from experiments.kit.live.observer import Kept, Stop
+from experiments.kit.live.system import Kept, Stop
 
 FINE = Kept(97, 0, 0, 0)
 

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import mobee
-from experiments.bench.calibration import Calibration
 from experiments.bench.ik import (
     BOXES,
     MOTORS,
@@ -22,6 +21,7 @@ from experiments.bench.ik import (
     targets,
 )
 from experiments.bench.ik_rivals import MinkPeer, Target
+from experiments.bench.timing import Calibration
 from mobee.errors import NotInstalled
 from mobee.roadmap.ik.problem import Problem
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from experiments.kit.records import Records, Row, read_records
+from experiments.kit.run_folder import Records, Row, read_records
 
 COLUMNS = ("robot", "objects")
 

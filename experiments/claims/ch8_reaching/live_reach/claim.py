@@ -56,7 +56,7 @@ from experiments.claims.ch8_reaching.live_reach.tries import BLOCK, Block, Job, 
 from experiments.kit.command_line import Progress, positive_whole
 from experiments.kit.experiment import OUR_AIM, Experiment, Measured, Steps, claim, judged
 from experiments.kit.live.launch import PHYSICS, TABLE, add_backend, launch, write_job
-from experiments.kit.live.recordings import POSITIONS
+from experiments.kit.live.system import POSITIONS
 from experiments.kit.plots import new_figure, saved
 from experiments.kit.rules import decides
 from experiments.kit.statistics import LEVEL, interval, share_interval
@@ -160,7 +160,10 @@ def results(folder: Path) -> dict[str, Any]:
 
 
 def _jobs(place: Path, seed: int, sizes: Sizes) -> Iterator[tuple[str, Job, float]]:
-    """Yield the blocks of a start in their order: name, job, ticks per second."""
+    """Yield the jobs of one start (independent repetition of the experiment) in the order in which they are performed.
+
+    Each item is the name of the job's folder, the job, and the rate of the simulator in ticks per second.  `place`: the start's folder.
+    """
     store = str((place / STORE).resolve())
     grid, fresh = grid_problems(seed)[: sizes.grid], fresh_problems(seed, sizes.fresh)
     for first in range(0, sizes.live, TRIES_PER_LAUNCH):
@@ -187,7 +190,10 @@ def _do(folder: Path, job: Job, seed: int, rate: float, backend: str) -> None:
 
 @cache
 def _nearest(place: tuple[float, float, float]) -> tuple[float, str]:
-    """Return the smallest remaining error of a reach from any state, offline, and the contacts there."""
+    """Return the smallest remaining error [m] of a reach from any state on the offline plant, and the contacts at its end as text.
+
+    `place`: position of the target's centre [m], root frame.  See `nearest_reach`.
+    """
     return nearest_reach(offline_plant(0), ReachTarget(np.array(place), aim=AIM))
 
 
@@ -220,7 +226,7 @@ def perform(folder: Path, job: Job, seed: int, rate: float = RATE, backend: str 
     """Launch a live system that performs one job, and records every tick in the folder; returns whether the run is repeatable.
 
     `job`: a block of tries (see `Job`).  `seed`: of the simulated robot.  `rate`: ticks per second.  `backend`: physics engine.  Raises
-    LaunchFailed.
+    LaunchFailed if the live system fails or does not end in time.
     """
     write_job(folder, job)
     world, seconds = WITH_OBSTACLE if job.kind == "moving" else TABLE, MAX_TRY * max(1, len(job.problems) + job.tries)
@@ -388,7 +394,8 @@ def _spent(tries: Sequence[Judged]) -> dict[str, Any]:
 def misses(blocks: Sequence[Block], touchable: frozenset[int], why: Callable[[tuple[float, float, float]], str]) -> list[dict[str, Any]]:
     """Return a row for each missed try of learner and planner, for targets that can be reached.
 
-    `touchable`: numbers of these targets among the 27.  `why`: function that explains a miss of the learner from the target's position [m].
+    Keys of a row: "contestant", "target", "distance from the surface [mm]", "reaches" (their number) and "why".  `touchable`: numbers of
+    these targets among the 27.  `why`: function that explains a miss of the learner from the target's position [m].
     """
     return [
         {

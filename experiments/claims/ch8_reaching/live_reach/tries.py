@@ -31,9 +31,9 @@ from experiments.claims.ch8_reaching.live_reach.problems import (
 )
 from experiments.kit.control.plant_runs import place
 from experiments.kit.live.launch import read_done
-from experiments.kit.live.recordings import CONTACTS, POSITIONS, Touch, read_touches
+from experiments.kit.live.system import CONTACTS, POSITIONS, Touch, read_touches
 from experiments.kit.reaching.arm import MARKER, PART
-from experiments.kit.structs import decoded, encoded
+from experiments.kit.run_folder import decoded, encoded
 from mobee import Model, OfflinePlant
 from mobee.arrays import Array
 from mobee.reach import RADIUS, ReachTarget
@@ -179,7 +179,11 @@ def judge(tried: Tried, position: Array, q: Array, deep: list[Touch], model: Mod
 
 
 def _first_motion(q: Array, asked: int) -> int:
-    """Return the ticks from a request to the first in which a joint of the arm has moved farther than at rest."""
+    """Return the ticks from a request in tick `asked` to the first tick in which a joint of the arm moves; -1 if none moves.
+
+    A joint moves if its distance from its position before the request exceeds MOVED plus the largest range of a joint while the arm was at
+    rest.  `q`: joint positions (T, n) rad, as in `judge`.
+    """
     arm = q[:, robot().parts[PART].slice]
     before, after = arm[asked - STILL : asked], arm[asked:]
     bound = MOVED + np.ptp(before, axis=0).max()
@@ -202,7 +206,7 @@ def read_block(folder: Path) -> Block:
 def nearest_reach(plant: OfflinePlant, target: ReachTarget) -> tuple[float, str]:
     """Simulate a reach for the target from every state, and return the smallest remaining error [m] and the contacts at its end.
 
-    The contacts are the deepest two, as text with the names of the links and the depth in mm.  The search stops at the first reach that
+    The contacts are the deepest two, as text with the names of both volumes and the depth in mm.  The search stops at the first reach that
     ends within 2 cm of the surface.
     """
     best, ending = np.inf, plant.robot.home
@@ -223,7 +227,10 @@ def nearest_reach(plant: OfflinePlant, target: ReachTarget) -> tuple[float, str]
 
 
 def _contacts(plant: OfflinePlant, q: Array) -> str:
-    """Format the deepest contacts of a pose (n,) rad while the hand reaches."""
+    """Return the two deepest contacts in the pose `q` (n,) rad as text, each with the names of both volumes and the depth [mm].
+
+    As in a reach, contacts of the hand with the target are left out.
+    """
     contacts = sorted(plant.model.evaluate(q, reaching=MARKER).contacts, key=lambda contact: -contact.depth)
     return ", ".join(f"{one.first} {one.second} {1e3 * one.depth:.0f}" for one in contacts[:NAMED_CONTACTS])
 

@@ -7,7 +7,7 @@ from services.common.config import ServiceConfig
 
 
 class Config(ServiceConfig, frozen=True, kw_only=True):
-    """The settings of the performer, besides those of every service."""
+    """The settings of the performer (a service that calls a function of an experiment), besides those of every service."""
 
     perform: str = ""
     """The function to call, as "package.module:function"; its arguments are the service and the folder of the job."""

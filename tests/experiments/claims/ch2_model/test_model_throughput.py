@@ -22,7 +22,7 @@ from experiments.claims.ch2_model.model_throughput_endurance import (
     witnesses,
 )
 from experiments.claims.ch2_model.model_throughput_threads import Oscillator
-from experiments.kit.records import read_records
+from experiments.kit.run_folder import read_records
 from mobee.model.engine import changed
 from tests.experiments.options import options_of
 

@@ -12,7 +12,7 @@ from experiments.claims.ch3_roadmaps import replanning
 from experiments.claims.ch3_roadmaps.replanning import CLAIMS, findings, keep_poses, measure, read_measured
 from experiments.claims.ch3_roadmaps.replanning_live import ABOVE, LEFT, PART, RIGHT, Acted, Crossing, Job, ball, model, new_map, robot
 from experiments.kit.live.launch import append_done, read_job, write_job
-from experiments.kit.live.recordings import CONTACTS, POSITIONS
+from experiments.kit.live.system import CONTACTS, POSITIONS
 from mobee.errors import InvalidValue
 
 ARM = robot().parts[PART].slice

@@ -38,7 +38,7 @@ from experiments.claims.ch4_reflex.babbling_trial import (
     read_commands,
     scenario,
 )
-from experiments.kit.live.recordings import CONTACTS, POSITIONS, Touch
+from experiments.kit.live.system import CONTACTS, POSITIONS, Touch
 from mobee import load_robot
 from mobee.errors import InvalidValue
 from mobee_cli.__main__ import main

@@ -8,8 +8,8 @@ import pytest
 
 from experiments.claims.ch5_control import constraint_violations
 from experiments.kit.control.arm_commands import PHASES, Tried, random_command, try_commands
+from experiments.kit.control.measures import clause_violations
 from experiments.kit.control.plant_runs import PlantRun
-from experiments.kit.control.safety import clause_violations
 from mobee import Gains, load_robot
 
 

@@ -7,7 +7,7 @@ import pytest
 from experiments.claims.ch7_learning import changed_outcomes
 from experiments.claims.ch7_learning.changed_outcomes import CHANGES, CHECK_PERIOD, WINDOW, Run, compare, plant_of, summary, trial
 from experiments.kit.learning.arm import arm_space
-from experiments.kit.learning.truth import l1, truth_of
+from experiments.kit.learning.outcomes import l1, truth_of
 from mobee import TransitionModel
 
 CHECKS = 4 * WINDOW // CHECK_PERIOD  # half of them before the change

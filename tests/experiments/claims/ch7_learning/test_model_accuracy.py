@@ -16,7 +16,7 @@ from experiments.claims.ch7_learning.model_accuracy import (
     trial,
     truths,
 )
-from experiments.kit.learning.truth import model_error
+from experiments.kit.learning.outcomes import model_error
 from mobee import CuriousAgent
 from tests.experiments.finished_cells import Cell, finished
 

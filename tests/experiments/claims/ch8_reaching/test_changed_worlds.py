@@ -26,8 +26,7 @@ from experiments.claims.ch8_reaching.changed_worlds import (
 from experiments.kit.cells import Cell
 from experiments.kit.experiment import judged
 from experiments.kit.learning.arm import RIGHT, robot
-from experiments.kit.reaching.arm import MARKER, JudgedPlant, reach_space
-from experiments.kit.reaching.seen_hand import SeenHand
+from experiments.kit.reaching.arm import MARKER, JudgedPlant, SeenHand, reach_space
 from tests.experiments.finished_cells import finished
 
 

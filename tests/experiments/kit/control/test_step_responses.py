@@ -4,8 +4,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from experiments.kit.control.measures import motor_step, postures, step_response
 from experiments.kit.control.plant_runs import PlantRun, icub
-from experiments.kit.control.step_responses import motor_step, postures, step_response
 
 DT = 0.01
 T = np.arange(DT, 6.0, DT)

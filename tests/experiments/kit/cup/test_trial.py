@@ -6,7 +6,7 @@ import pytest
 
 pytest.importorskip("mujoco")
 
-from experiments.kit.cup.scene import CUP, TOP
+from experiments.kit.cup.approaches import CUP, TOP
 from experiments.kit.cup.trial import Trial, leans
 
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.kit.learning.truth import Truth, l1, model_error, most_likely, sampling_error, truth_of, walk
+from experiments.kit.learning.outcomes import Truth, l1, model_error, most_likely, sampling_error, truth_of, walk
 from mobee.learning.tabular import TabularPlant, half_space
 from tests.mobee.learning.toys import arm
 

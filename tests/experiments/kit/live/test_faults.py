@@ -18,7 +18,7 @@ import pytest
 from experiments.kit.live.faults import KINDS, Fault, _frozen, _throttled, _without_disk, draw, shrunk
 from experiments.kit.live.floods import flood
 from experiments.kit.live.launch import LaunchFailed
-from experiments.kit.live.observer import Moment, Observer, compare_transitions, stop_after, survived, violations
+from experiments.kit.live.system import Moment, Observer, compare_transitions, stop_after, survived, violations
 from mobee.robot.load import load_robot
 from mobee.store import STORE, Transition, TransitionStore
 

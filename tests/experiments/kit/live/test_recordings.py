@@ -3,7 +3,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from experiments.kit.live.recordings import Touch, read_touches, touches
+from experiments.kit.live.system import Touch, read_touches, touches
 
 HAND, ELBOW = "l_hand table", "chest l_elbow"
 

@@ -7,7 +7,7 @@ from experiments.claims.ch8_reaching.live_reach.claim import CLAIMS, NAMES, Runs
 from experiments.claims.ch8_reaching.live_reach.problems import FRESH, GRID
 from experiments.claims.ch8_reaching.live_reach.tries import Block, Judged
 from experiments.kit.experiment import judged
-from experiments.kit.live.recordings import Touch
+from experiments.kit.live.system import Touch
 
 KNOWN, LEFT = frozenset(range(20)), frozenset(range(1, 20))
 

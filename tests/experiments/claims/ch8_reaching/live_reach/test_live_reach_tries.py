@@ -11,7 +11,7 @@ import pytest
 from experiments.claims.ch8_reaching.live_reach.problems import FRESH, MARKER, PART, Problem, robot
 from experiments.claims.ch8_reaching.live_reach.tries import Job, Tried, measure, read_block, write_block
 from experiments.kit.live.launch import append_done
-from experiments.kit.live.recordings import CONTACTS, POSITIONS
+from experiments.kit.live.system import CONTACTS, POSITIONS
 from mobee import Model
 from mobee.reach import RADIUS
 

@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A plant with MuJoCo in one process: model, controller and physics tick by tick, as the live system runs them in lockstep.
+"""Plants of experiments: one with MuJoCo in one process, and one that passes all calls to another plant.
 
-There are two worlds.  In the model's world, objects are where the robot believes them to be.  In the world of the physics, they are at
-their true places.
+`PhysicsPlant` runs model, controller and physics tick by tick, as the live system runs them in lockstep.  It has two worlds: in the model's
+world, objects are where the robot believes them to be; in the world of the physics, they are at their true places.  `WrappedPlant` is the
+base class of plants that observe what an agent does, or falsify what it measures.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from mobee.model.contact import touched_by
 from mobee.model.pose import Pose
 from mobee.model.world_object import WorldObject
 from mobee.plant import Outcome
-from mobee.reach import ReachOutcome, ReachTarget
+from mobee.reach import ReachOutcome, ReachPlant, ReachTarget
 from mobee.roadmap.playback import PERIOD, attractors, timed
 from mobee.simulation.actions import ReachesUnderWay
 from mobee.simulation.motors import MotorParameters
@@ -31,8 +32,41 @@ from services.robot_sim.strength import with_torques
 if TYPE_CHECKING:
     from services.robot_sim.mujoco_backend import MujocoBackend
 
+P = TypeVar("P", bound=ReachPlant)
 DT = 0.01  # s
 SLOW = float(np.deg2rad(1.0))  # rad/s, of motors at rest
+_MOVING: Verdict = "moving"
+
+
+class WrappedPlant(Generic[P]):
+    """A `mobee.reach.ReachPlant` that passes every call to the plant `inner`; a subclass changes some of the methods."""
+
+    def __init__(self, inner: P) -> None:
+        self.inner, self.robot = inner, inner.robot
+
+    @property
+    def q(self) -> Array:
+        """The present encoder values of all motors of the inner plant, (n,) rad, in the order of `robot.motors`."""
+        return self.inner.q
+
+    def measure(self, part: str) -> Array:
+        """Return the present encoder values of the part's motors, (n_part,) rad, from the inner plant."""
+        return self.inner.measure(part)
+
+    def act(self, part: str, target: Array) -> Outcome:
+        """Perform the action on the inner plant: set the attractor to `target` (n_part,) rad and wait, as in `mobee.plant.Plant.act`."""
+        return self.inner.act(part, target)
+
+    def present(self, target: ReachTarget | None) -> None:
+        """Put the target into the world of the inner plant, or move it there; None removes it, as in `mobee.reach.ReachPlant.present`."""
+        self.inner.present(target)
+
+    def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
+        """Perform the reach on the inner plant: pull the marker to the presented target, as in `mobee.reach.ReachPlant.reach`.
+
+        `stay`: the part stays where the reach ended; otherwise its attractor pulls it back.
+        """
+        return self.inner.reach(part, marker, stay)
 
 
 class PhysicsPlant:
@@ -180,6 +214,3 @@ class PhysicsPlant:
             speeds, changes = self.controller.velocity[where], self.controller.acceleration[where]
             verdict = test.update(self.time, np.abs(speeds), np.abs(changes))
         return Outcome(self.measure(part), verdict == "settled", self.time - begun, touched_by(self._pose, part))
-
-
-_MOVING: Verdict = "moving"

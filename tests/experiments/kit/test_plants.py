@@ -5,9 +5,8 @@ import numpy as np
 import pytest
 
 pytest.importorskip("mujoco")
-from experiments.kit.cup.approaches import ready, roadmap, robot  # noqa: E402  # only where MuJoCo is
-from experiments.kit.cup.scene import RADIUS, TOP, Piece, Placement, table, true_world  # noqa: E402  # only where MuJoCo is
-from experiments.kit.physics_plant import PhysicsPlant  # noqa: E402  # only where MuJoCo is
+from experiments.kit.cup.approaches import RADIUS, TOP, Piece, Placement, ready, roadmap, robot, table, true_world  # noqa: E402  # only where MuJoCo is  # noqa: E402  # only where MuJoCo is
+from experiments.kit.plants import PhysicsPlant  # noqa: E402  # only where MuJoCo is
 from mobee import Model, ReachTarget, box  # noqa: E402  # only where MuJoCo is
 from mobee.behaviours.bump import BumpWatch  # noqa: E402  # only where MuJoCo is
 from mobee.behaviours.pick import FAST  # noqa: E402  # only where MuJoCo is

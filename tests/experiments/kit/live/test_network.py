@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from experiments.kit.live.wire import Faults, Wire
+from experiments.kit.live.network import Faults, Wire
 
 
 @pytest.fixture

@@ -4,8 +4,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from experiments.kit.control.measures import clause_violations, deepest, is_listed, limit_violations, oscillation
 from experiments.kit.control.plant_runs import PlantRun
-from experiments.kit.control.safety import clause_violations, deepest, is_listed, limit_violations, oscillation
 from mobee.model.model import Model
 from mobee.model.world_file import load_world
 from mobee.robot.load import load_robot
