@@ -90,7 +90,7 @@ def rig_of(robot: Robot, marker: str, settings: CameraSettings) -> Rig:
 
 
 def _offline(arguments: argparse.Namespace) -> tuple[Calibration, Array]:
-    """Return the calibration of a simulated robot, and its true errors (P,)."""
+    """Return the calibration of a simulated robot, and the true values (P,) of its P parameters, in the order of its names."""
     settings, robot, seed = CameraSettings(), robot_given(arguments), arguments.seed
     if seed < 0:
         raise UserError(f"--seed {seed}: must be 0 or more", BAD_INPUT)
@@ -126,7 +126,10 @@ def _qualities(found: Calibration) -> dict[str, Quality]:
 
 
 def _lines(found: Calibration, drawn: Array | None, file: Path) -> list[str]:
-    """Return the report, at most 80 columns wide."""
+    """Return the report on a calibration as lines of text: errors before and after it, and each parameter with its deviation.
+
+    `drawn`: (P,), true values of the parameters; None if they are unknown.
+    """
     lines = [
         f"{found.robot}, cameras {' and '.join(found.cameras)}, a tag on {found.tag.marker}: {found.pictures} moments seen",
         f"{'median / 95 %':<30}{'before':>18}{'after':>18}",

@@ -101,7 +101,7 @@ def _pairs(robot: Robot, groups: list[UntestedGroup], every: bool) -> list[str]:
 
 
 def _srdf(robot: Robot) -> list[str]:
-    """Return the SRDF that was read with a URDF, and which of its poses is home."""
+    """Return a text, as lines, that names the SRDF file that was read with a URDF and says which pose is home; [] without an SRDF."""
     file = robot.where.get(("srdf", robot.name))
     if file is None:
         return []
@@ -143,7 +143,11 @@ def _as_json(content: Robot | World, findings: tuple[Finding, ...], groups: list
 
 
 def _write_srdf(arguments: argparse.Namespace) -> tuple[list[str], dict[str, Any], Path | None]:
-    """Write the pairs that touch; return the report as lines and for JSON, and the SRDF to read the robot with."""
+    """Write the pairs of links that touch at home or in all random poses into the SRDF of a URDF, so that they are not tested.
+
+    For another robot file the pairs are only listed. Returns the report as lines and as JSON data, and the path of the SRDF with which the
+    robot is read, None without one.
+    """
     path = find_file(arguments.file, ROBOTS, "robot")
     if path.suffix.lower() != ".urdf":
         with warnings.catch_warnings():
@@ -179,7 +183,10 @@ def _title(done: LeftOut) -> str:
 
 
 def _ignores(pairs: tuple[TouchingPair, ...], mjcf: bool) -> list[str]:
-    """Return the lines to add to a zero-position file, or to an MJCF."""
+    """Return a report with the XML lines that exclude pairs from the tests for contact, for the user to add to a robot file.
+
+    The file is an MJCF, or one in the zero-position format (mobee's own).
+    """
     if not pairs:
         return [f"No links touch at home or in all of {POSES} random poses.", ""]
     if mjcf:

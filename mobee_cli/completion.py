@@ -47,7 +47,10 @@ def whole_parser() -> argparse.ArgumentParser:
 
 
 def _complete_files(parser: argparse.ArgumentParser, file: Any, folder: Any) -> None:
-    """Let arguments that are named after files or folders be completed by these, in a parser and those of its actions."""
+    """Let the shell complete names of files or folders for the arguments of a parser, and of its subparsers, that expect them.
+
+    An argument expects these if its name says so, such as FILE or DIR. `file`, `folder`: the completions of shtab for the two kinds.
+    """
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
             for one in action.choices.values():

@@ -87,7 +87,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _lines(network: Network, found: dict[str, Quality], pictures: int, seconds: float, file: Path) -> list[str]:
-    """Return the report, at most 80 columns wide."""
+    """Return the report on the trained network as lines of text: the quality on pictures that were not used to train it."""
     some = list(found.values())
     rows = [(f"{one.name} found, share of those wholly visible", [f"{by.found[one.name]:.2f}" for by in some]) for one in network.things]
     rows += [

@@ -78,7 +78,10 @@ def _kept(sender: StopSender, recorded: bool) -> str:
 
 
 def _stop(session: Any, sender: StopSender, reason: str) -> list[str]:
-    """Repeat the stop until every part reports it; raises UserError if one does not, or if none is there."""
+    """Repeat the stop until every part of the robot reports it; return the names of the parts, sorted.
+
+    Raises UserError if a part does not report it in time, or if no part publishes its state.
+    """
     stopped: dict[str, bool] = {}  # by part; never False again: a repetition after a release would undo it
 
     def note(received: Received) -> None:

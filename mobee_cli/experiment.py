@@ -235,7 +235,10 @@ def _runs_to_write(arguments: argparse.Namespace) -> list[Path]:
 
 
 def _freeze(arguments: argparse.Namespace) -> int:
-    """Freeze the rules of the named experiments, or of all."""
+    """Freeze (write to the file FROZEN) the rules by which the named experiments, or all, are judged.
+
+    The rules are frozen before the experiments run with new seeds.
+    """
     if arguments.folders:
         raise InvalidValue("--freeze takes names of experiments, and no RUN: rules are frozen before the experiment is run with new seeds.")
     names = freeze([load_experiment(name).name for name in arguments.freeze or EXPERIMENTS])
@@ -247,7 +250,7 @@ def _freeze(arguments: argparse.Namespace) -> int:
 
 
 def _check(arguments: argparse.Namespace) -> int:
-    """Compute the table from the raw records; the command fails if a number or a verdict differs."""
+    """Compare the table of claims (claims.json) with the raw records; the exit code is FAILED if a number or a verdict differs."""
     if arguments.folders:
         raise InvalidValue("--check takes no RUN: it compares the raw records of the repository with the table.")
     start, record = time.monotonic(), recorded()

@@ -112,7 +112,11 @@ def _add(folder: Path, arguments: argparse.Namespace) -> int:
 
 
 def _party(name: str, given: Party | None) -> Party | None:
-    """Return the party of a new identity; raises UserError if its name already says another one."""
+    """Return the party (role on the bus, such as "client") of a new identity; None for the router.
+
+    `given`: party that the user has chosen; None: it follows from the name. Raises UserError if the name is that of another party, such as
+    the name of a service: only a name of the party "client" can be given another party.
+    """
     party = None if name == ROUTER else party_of(name)
     if given is None or given == party:
         return party

@@ -84,7 +84,10 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _files(arguments: argparse.Namespace, setup: Setup) -> Files:
-    """Return the files in the folder of the options, or in a new one; raises UserError if the folder has some of another play."""
+    """Return the paths of the files of this run, in the folder of --save, or in a new folder without --save.
+
+    Raises UserError if the folder already contains a scenario of the same name.
+    """
     if arguments.save is None:
         name = f"{time.strftime('%Y%m%d-%H%M%S')}-play-{setup.name}"
         return Files(free_folder(arguments.runs, name) / f"{setup.name}.sqlite")

@@ -179,7 +179,10 @@ def _setup(arguments: argparse.Namespace) -> AbstractContextManager[Setup]:
 
 
 def _chooser(arguments: argparse.Namespace) -> Choose:
-    """Return a function that chooses the hand by the options, and for a run by the part that has learned."""
+    """Return a function that chooses the part and the marker that reach for the target, from the options of the command.
+
+    If the options name no part, and the given run has one part that has learned to reach, this part is chosen.
+    """
 
     def choose(robot: Robot, position: Array | None) -> Hand:
         part = arguments.part

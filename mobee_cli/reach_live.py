@@ -169,7 +169,10 @@ def live(endpoint: str, choose: Choose, target: Array | str) -> Iterator[Setup]:
 
 
 def _position_of(session: Any, name: str) -> Array | None:
-    """Return the position of an object of the model's world, (3,) m; None if it is not known: presenting it then raises."""
+    """Return the position of an object in the world of the service `model`, (3,) m, root frame.
+
+    None if there is no such object, or no answer; the later call that makes the object the target then raises an error.
+    """
     try:
         objects = rpc.call(session, WHO, keys.world_rpc("list"), Empty, World, tries=3).objects
     except rpc.CallFailed:

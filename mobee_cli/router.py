@@ -57,7 +57,10 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _open(listens: str, opened: contextlib.ExitStack) -> tuple[str, Any, None]:
-    """Open a router that admits every program, and a session with it; `opened` closes the router."""
+    """Open a router that admits every program, and a session with it. The exit of `opened` closes the router.
+
+    Returns the address, the session, and None in place of the log of refusals, since nothing is refused.
+    """
     opened.enter_context(open_router(listens))
     if not is_local(listens):
         print("mobee router: every program that reaches this address can move the robot: keep it inside a trusted network", file=sys.stderr)
@@ -65,7 +68,10 @@ def _open(listens: str, opened: contextlib.ExitStack) -> tuple[str, Any, None]:
 
 
 def _secured(arguments: argparse.Namespace) -> tuple[str, Any, RefusalLog]:
-    """Open a router that admits identities of a folder of keys; it is its own session, because its certificate can only listen."""
+    """Open a router that admits only programs with an identity in a folder of keys; return its address, session and log of refusals.
+
+    The session is that of the router itself, because with the router's certificate no second session can connect.
+    """
     from services.common.certificates import KeyFolder
 
     keys = KeyFolder((arguments.keys or default_folder()).resolve())

@@ -51,7 +51,11 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _services(present: dict[str, list[str]], answers: dict[str, Stat]) -> dict[str, Any]:
-    """Return the state of every service that is present or that the launcher supervises; `host`: None for that of the launcher."""
+    """Return the state of each service that is on the bus, or that the launcher supervises, as a dict by name.
+
+    `present`: instances on the bus, by name. `answers`: replies to the call `stat`. The entry "host" of a service is None on the host of
+    the launcher.
+    """
     launcher = answers.get("launcher")
     words = launcher.words if launcher else {}
     restarts = {

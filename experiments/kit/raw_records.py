@@ -99,7 +99,10 @@ def _members(path: Path) -> dict[str, bytes]:
 
 
 def _unpacked(path: Path) -> bytes:
-    """Return a .npz file whose arrays are not compressed: the archive compresses them better."""
+    """Return the content of the .npz file `path`, packed anew without compression, as bytes.
+
+    The archive of the run compresses uncompressed arrays better.  The files inside have no time, so equal arrays give equal bytes.
+    """
     content = io.BytesIO()
     with zipfile.ZipFile(path) as source, zipfile.ZipFile(content, "w") as unpacked:
         for name in source.namelist():

@@ -31,7 +31,11 @@ MIN_RATE = RATES[-1]
 
 @dataclass
 class _Decisions:
-    """The level of the intervals that decide, whether one was computed, and the statistics of bootstrap samples that are known."""
+    """The state of this module while a decision is computed from intervals; `error_rate` sets it, and the interval functions read it.
+
+    `level`: confidence level of the intervals.  `used`: whether `decision_level` has been called.  `samples`: the statistics of bootstrap
+    samples that are computed already, (resamples,) each, by the arguments of `_sampled`.
+    """
 
     level: float = LEVEL
     used: bool = False
@@ -52,9 +56,10 @@ def _deciding_at(level: float, samples: dict[tuple[object, ...], Array]) -> Iter
 
 
 def decision_level() -> float:
-    """Return the confidence level of the intervals that decide claims: LEVEL (0.95), or the level that a call of `error_rate` tries now.
+    """Return the confidence level of the intervals that decide claims: LEVEL (0.95), except in the function that `error_rate` calls.
 
-    The call has a side effect: inside `error_rate`, it records that the decision uses intervals.
+    `error_rate` calls that function repeatedly, with another level each time; inside it, the present level is returned, and `error_rate`
+    notices that the function uses intervals.
     """
     made = _decisions.get(_Decisions())
     made.used = True

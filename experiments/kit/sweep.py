@@ -30,7 +30,7 @@ MAX_LISTED = 3  # failed cells that are named in the message; the folder has all
 
 
 class CellsFailed(MobeeError):
-    """Raised at the end of a sweep in which cells failed; all other cells are finished and on disk."""
+    """Raised at the end of a sweep in which cells (trials with one condition and seed) failed; all other cells are finished and on disk."""
 
 
 class Condition(NamedTuple):
@@ -306,9 +306,9 @@ class TimeLeft:
 
     @property
     def seconds(self) -> float:
-        """The predicted remaining time [s]; infinite before a cell has ended.
+        """The predicted remaining time [s]; infinite until a first cell (one trial) has ended since `start`.
 
-        It is the remaining cost times the average time per unit of cost since `start`.
+        It is the sum of the costs of the unfinished cells times the average time per unit of cost since `start`.
         """
         return (self._left - self._done) * (self._now - self._start) / self._done if self._done else float("inf")
 

@@ -143,7 +143,10 @@ class View(ctypes.Structure):
 
 
 def view(array: Array | Ints | Table) -> View:
-    """Return the address and the length of a C-contiguous array; the caller must keep the array alive while the core uses it."""
+    """Return the memory address of a C-contiguous array and its number of rows, len(array).
+
+    The caller must keep the array alive while the core uses it. Raises ValueError as `address` does.
+    """
     return View(address(array), len(array))
 
 

@@ -54,7 +54,10 @@ class _Memory:
 
 
 def _rows(take: Callable[[int, int], None], at: int, count: int) -> tuple[Ints, Array]:
-    """Return the contacts that an object of the core has computed, (count, NUMBERS) and (count, REALS)."""
+    """Return the contacts that an object of the core has computed: their integers (count, NUMBERS), and their reals (count, REALS).
+
+    `take`: function of the core that moves the two arrays to the caller. `at`: address of the object. `count`: number of contacts.
+    """
     if count == 0:
         return NO_NUMBERS, NO_REALS
     arrays = (ADDRESS * 2)()
@@ -260,10 +263,10 @@ class Following:
         return *_rows(_neighbours_rows, self.at, count), torque
 
     def state(self) -> tuple[int, int, int]:
-        """Return three numbers, for tests: the state of the list, the number of pairs in it, and the number of poses for which it was used.
+        """Return three numbers, for tests: a state, the number of pairs of volumes in the neighbour list, and how many poses used the list.
 
-        States: 0: nothing is stored; 1: only the last pose is stored; 2: the list is stored; 3: the world or the reaching hands changed
-        after a list had been used for at least 4 poses, and a new list is made in the next pose.
+        States: 0: nothing is stored; 1: only the last pose is stored; 2: the neighbour list is stored; 3: the world or the reaching hands
+        changed after a list had been used for at least 4 poses, and a new list is made in the next pose.
         """
         found = np.empty(3, dtype=np.int64)
         _neighbours_state(self.at, address(found))
@@ -281,9 +284,9 @@ def sines_cosines(angles: Array) -> tuple[Array, Array]:
 def swung(of: Handle, then: Array, now: Array, shapes: int) -> Array:
     """Return upper bounds (S, L) m of the motion of each shape between two poses, for tests.
 
-    Rows are shapes, in the order of the robot's tables. Column k bounds the motion of each shape relative to the last common ancestor of
-    its link and link k in the kinematic tree. `of`: handle of the robot. `then`, `now`: (J,) rad or m, positions of all joints in the two
-    poses. `shapes`: the number S of shapes.
+    Rows are the S shapes, in the order of the robot's tables; columns are the L links. Column k bounds the motion of the shape relative to
+    the last common ancestor of its link and link k in the kinematic tree (one of the two, if it carries the other). `of`: handle of the
+    robot. `then`, `now`: (J,) rad or m, positions of all J = L - 1 joints in the two poses. `shapes`: the number S of shapes.
     """
     out = np.empty((shapes, len(then) + 1))
     _swung(of.at, address(then), address(now), address(out))

@@ -78,11 +78,13 @@ class DebiasedCounts(ctypes.Structure):
 class OutcomeCounts(ctypes.Structure):
     """The counts of a transition model for the core, `OutcomeCounts` of core/observations.cpp; observations write into its arrays.
 
-    `arrays`: the arrays by the name of the structure's field, such as "count" (S, A, B); they are kept alive. `over_states`: the outcomes
-    over which the reward, the Kullback-Leibler divergence of the distribution after an observation from the one before, is computed. 0: the
-    outcomes of the state-action so far; above 0: this number of states, each with a count of 1 before the first observation. `forgetting`:
-    factor by which the counts of earlier observations of a state-action are multiplied at each new one. `at`: address of the structure.
-    Functions of the core do not check the indices of states, actions and outcomes.
+    `arrays`: the arrays by the name of the structure's field, such as "count" (S, A, B); they are kept alive. `forgetting`: factor by
+    which the counts of earlier observations of a state-action are multiplied at each new one. `at`: address of the structure. Functions of
+    the core do not check the indices of states, actions and outcomes.
+
+    The reward of an observation is the Kullback-Leibler divergence between the distributions of the outcomes after and before it.
+    `over_states` defines these distributions: 0: over the outcomes that the state-action has had, the new one included; above 0: over this
+    number of states, each with a count of 1 before the first observation.
     """
 
     _fields_ = (

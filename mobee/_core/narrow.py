@@ -110,7 +110,7 @@ def overlaps(first: Volumes, second: Volumes) -> tuple[Reals, NDArray[Any]]:
 
 
 def distances(first: Volumes, second: Volumes) -> Reals:
-    """Return the distances (p,) m of p pairs of volumes: of first[i] from second[i]."""
+    """Return the distances (p,) m of p pairs of volumes, of first[i] from second[i]; 0 for a pair that overlaps."""
     apart = np.empty(len(first))
     _distance(*_pairs(first, second), address(apart))
     return apart

@@ -166,9 +166,9 @@ def cast(
 def shade(which: NDArray[np.int32], normal: Floats, pixels: NDArray[np.int64], colors: Floats, lamp: Lamp, brightness: Floats) -> None:
     """Compute the colour of each of K pixels in the light of the lamp, and add it to the `brightness` of the pixel, in place.
 
-    `brightness` (K, 3): red, green and blue; 0 to 255 is added. `which` (R,) and `normal` (R, 3): of R rays, the index of the volume or
-    surface that is hit, and its normal, as `cast` returns them. `pixels` (K,): index of the ray of each pixel. `colors` (N, 3): row k is
-    the red, green and blue, 0 to 255, of the volume or surface with the index k.
+    `brightness` (K, 3): red, green and blue; each number increases by 0 to 255. `which` and `normal`: what `cast` returns for R rays: the
+    index of the volume or surface that each ray hits (R numbers), and the normal there (3 R numbers). `pixels` (K,): for each pixel, the
+    index of its ray (0 to R - 1). `colors` (N, 3): row k is the red, green and blue, 0 to 255, of the volume or surface with the index k.
     """
     arrays = (address(array) for array in (which, normal, pixels, colors, brightness))
     towards, nothing = (REAL * 3)(*(float(np.float32(one)) for one in lamp.towards)), (ctypes.c_float * 3)(*lamp.nothing)

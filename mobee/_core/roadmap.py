@@ -62,10 +62,12 @@ def descend(
     """Move the free motors of every start pose, by least squares, until it satisfies the aims; `q` (B, n) rad changes in place.
 
     An aim is a condition on the pose: for example, a point of a link shall be at a given place. Returns the number of poses that were
-    evaluated, and the remaining errors (B, K) of the K aims [m or rad]. `robot`: handle of the robot in the core. `aims` (K, 4): kind,
-    first link, second link and motor of each aim (`Aim` in core/aims.hpp). `goals`: the goals of all aims (`Goal` in core/aims.hpp), in one
-    row for all starts or in one row for each start. `free` (d,): indices of the free motors. `limits`: the lowest and the highest positions
-    of the free motors, each (d,) rad. `steps`: largest number of steps for a start. `threads`: number of threads.
+    evaluated, and the remaining errors (B, K) of the K aims [m or rad].
+
+    `robot`: handle of the robot in the core. `aims` (K, 4): kind, first link, second link and motor of each aim (`Aim` in core/aims.hpp).
+    `goals` (1, 26 K), the same goals for all starts, or (B, 26 K), own goals for each start; a goal has 26 numbers (`Goal` in
+    core/aims.hpp). `free` (d,): indices of the free motors. `limits`: the lowest and the highest positions of the free motors, each (d,)
+    rad. `steps`: largest number of steps for a start. `threads`: number of threads.
     """
     residuals = np.empty((len(q), len(aims)))
     low, high = limits

@@ -102,8 +102,9 @@ class Silhouette:
         """Store the outline for the core; the arrays are those of core/silhouettes.cpp.
 
         Args:
-            camera: the camera's origin (3,) m, its rotation (3, 3) with the columns right, down and ahead, and the factors (6, k) of its
-                errors, first of the noise, then of the bias: three displacements and three rotations for each unknown.
+            camera: four arrays: the camera's origin (3,) m; its rotation (3, 3) with the columns right, down and ahead; the factors (6, k)
+                of its noise; and the factors (6, l) of its bias. A column of factors is the displacement (3 numbers, m) and the rotation
+                (3 numbers, rad) of the camera that one unknown error causes if it is one standard deviation large.
             number: the index of this camera, and the number of cameras.
             flat: points (m, 2) of the outline in the plane at distance 1 of the camera.
             inverse: derivative of the points in this plane by their positions in pixels, (m, 2, 2).
@@ -140,9 +141,10 @@ class Silhouette:
     def rows(self, position: Array, turn: Array, touching: tuple[Array, Array], errors: Array) -> tuple[Array, Array]:
         """Return the distances of the outline's m points from the computed silhouette, (m,) px, and their derivatives (m, p).
 
-        A distance is positive outside the silhouette, and includes the effect of the errors. The p columns are the derivatives by the
-        position (3), by the logarithms of the shape's lengths, by the angle about the vertical (if it is unknown), and by the errors, in
-        this order. The next call overwrites both arrays.
+        A distance is positive outside the silhouette, and includes the effect of the errors. The p columns are the derivatives, in this
+        order: by the position (3 columns), by the logarithm of each independent length of the shape (1 to 3 columns, see `length_of` of the
+        constructor), by the angle about the vertical (1 column, none if the angle is known), and by the errors (e columns). The next call
+        overwrites both arrays.
 
         Args:
             position: position of the shape's middle, (3,) m, root frame.

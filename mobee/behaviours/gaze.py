@@ -187,7 +187,10 @@ class Gaze:
         return np.concatenate(angles), np.concatenate(by_motors), np.concatenate(by_target)
 
     def _eyes_to_centre(self) -> Ints:
-        """Return the eyes' motors that turn all cameras alike: the neck moves so that they come to the middle of their range."""
+        """Return the indices of the eyes' motors that turn all cameras in the same direction (so not those that only make them converge).
+
+        The neck moves so that these motors come to the middle of their range.
+        """
         if not len(self.eyes):
             return self.eyes
         home = self.robot.home
@@ -219,7 +222,11 @@ def gaze_motors(robot: Robot, part: str, links: Iterable[int], movable: NDArray[
 
 
 def _compensating(slopes: Array, drift: Array, velocity: Array, motors: Ints, damping: float) -> Array:
-    """Return the velocities of these motors with which the angles stay as they are, while the target drifts and all other motors move."""
+    """Return the velocities (k,) rad/s of k motors with which the angles to the target stay constant, by damped least squares.
+
+    `slopes`: (2 cameras, n), derivatives of these angles (see `Gaze._angles`) by the motors. `drift`: (2 cameras,) rad/s, their
+    change by the target's motion. `velocity`: (n,) rad/s, of all motors; the values of these k motors are ignored.
+    """
     others, slope = velocity.copy(), slopes[:, motors]
     others[motors] = 0.0
     found = -np.linalg.solve(slope.T @ slope + damping * np.eye(len(motors)), slope.T @ (slopes @ others + drift))
@@ -240,7 +247,7 @@ def _angles_of(seen: Array) -> Array:
 
 
 def _angle_slope(seen: Array) -> Array:
-    """Return the derivative (2, 3) of these angles by the place."""
+    """Return the derivatives (2, 3) rad/m of the angles that `_angles_of` returns by the place `seen` (3,) m in a camera's frame."""
     x, y, z = seen
     flat = max(float(np.hypot(x, z)), 1e-9)
     square = flat * flat + y * y

@@ -179,7 +179,11 @@ def pre_grasps(grasp: SideGrasp, thing: Upright) -> list[PreGrasp]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Motion:
-    """How a thing gets to a place (2,) m: postures (3, n) rad where it is, above the place and there, and one (n,) to retreat to."""
+    """A motion of the hand that puts a thing down at a place.
+
+    `place`: (2,) m, x and y in the root frame. `path`: (3, n) rad, the posture at the start, above the place, and at the place. `back`:
+    (n,) rad, the posture to which the hand retreats.
+    """
 
     place: Array
     path: Array

@@ -127,7 +127,10 @@ class MapPlanner:
         return whole if is_free(self._world, whole[-2:]) and is_around(self._world, self._marker, whole, blocked) else None
 
     def _without(self, blocked: Array) -> Roadmap:
-        """Return the map without the poses whose palms are near blocked places."""
+        """Return the map without the poses in which the palm is near a blocked position (see `near_any`), and without their edges.
+
+        `blocked`: (B, 3) m, root frame.
+        """
         if not len(blocked):
             return self._map
         kept = ~near_any(self._palms, blocked)

@@ -82,7 +82,10 @@ def _pushed_at_home(subject: Subject, index: int, value: float) -> Finding:
 
 
 def _idle_rows(subject: Subject, index: int, least: Array, most: Array) -> Iterator[Finding]:
-    """Find rows that hold in every pose, which makes the clause useless, and rows that hold in none."""
+    """Yield a note if a row a.q + b > 0 of a clause (condition on motor positions) holds in every pose, else one for each that never holds.
+
+    `least`, `most`: (rows,) rad, smallest and largest value of a.q + b for each row within the motor limits.
+    """
     where, name = subject.where("clause", str(index)), _name(subject, index)
     if least.max() > 0:
         yield Finding(
@@ -179,7 +182,11 @@ def _satisfiable(clauses: Sequence[Clause], limits: Array, poses: Array) -> bool
 
 
 def _corrected(clauses: Sequence[Clause], choice: tuple[int, ...], limits: Array, poses: Array) -> bool:
-    """Project the poses onto the chosen rows in turn and back into the limits; return whether one of them satisfies all rows."""
+    """Correct the poses (k, n) rad until one of them satisfies one chosen row of each clause; return whether that succeeds.
+
+    `choice`: for each clause, the index of its row a.q + b > 0. Each of at most 400 steps projects the poses onto the rows, one after the
+    other, and then clips them to the `limits` (n, 2) rad.
+    """
     a = np.array([clause.a[row] for clause, row in zip(clauses, choice, strict=True)])
     b = np.array([clause.b[row] for clause, row in zip(clauses, choice, strict=True)])
     squares = (a**2).sum(axis=1)

@@ -85,7 +85,10 @@ class Subject:
 
     @cached_property
     def _urdf_links(self) -> dict[str, str]:
-        """The link for every line of a URDF on which a shape of the robot begins."""
+        """The name of the link for each place "file:line" where an element of a link begins, in the URDF files of the robot's shapes.
+
+        Places that belong to several links are left out.
+        """
         lines = (line.rpartition(":")[0] for (kind, _), line in self.robot.where.items() if kind == "shape")
         files = {Path(file) for file in lines if file.lower().endswith(".urdf")}
         links = (node for file in files for node in read_xml(file) if node.tag == "link")
@@ -113,7 +116,10 @@ class Subject:
 
     @cached_property
     def limited(self) -> Robot:
-        """The robot with finite limits for all motors, from which the checks make their models: `range` replaces the limits of the file."""
+        """A copy of the robot in which all motors have finite limits, those of the property `range`, instead of the limits of its file.
+
+        The checks make their models from this copy.
+        """
         motors = zip(self.robot.motor_table, self.range, strict=True)
         return replace(self.robot, motor_table=tuple(replace(motor, limits=limits) for motor, limits in motors))
 

@@ -187,7 +187,10 @@ def home_zones(subject: Subject) -> Iterator[Finding]:
 
 
 def _drift(subject: Subject, motors: Sequence[Motor], better: dict[str, float]) -> str:
-    """Describe the motor that its limit zone pushes farthest: the rest position where the spring balances the limit force, from home."""
+    """Return a text about the motor whose home is deepest in its limit zone: how far from home it rests.
+
+    It rests where the spring towards home balances the limit force. `better`: by name of the motor, the nearest home outside the zone.
+    """
     gains = Gains.default()
     slope = gains.max_limit / gains.limit_width
     share = slope / (slope + gains.stiffness)
@@ -210,7 +213,7 @@ def _finding(subject: Subject, motors: Sequence[Motor], better: dict[str, float]
 
 
 def _change(subject: Subject, motor: Motor, home: float) -> str:
-    """Return the text for the file that sets this home, and the line where it belongs."""
+    """Return a text for the user: what to write in the robot's file to set this home (rad), and, except for MJCF, in which line."""
     line = _line(subject, motor).rpartition(":")[2]
     if subject.is_mjcf:
         return f"{motor.name} {home:.6g} in the qpos of a keyframe home"

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs the checks of a robot (CHECKS), of a world (units, thin obstacles, duplicates), or of a file of either.
+"""Runs the checks of a robot (CHECKS), of a world (units, thin obstacles, duplicates), or of a robot or world file.
 
-The findings of a file are also the warnings of its reader, elements of older versions of the format, and faults of the content.
+The findings about a file are the findings about its robot or world, the warnings of the file's reader, and notes on its XML elements, such
+as elements of older versions of the format.
 """
 
 from __future__ import annotations
@@ -133,7 +134,7 @@ CHECKS: tuple[Check, ...] = (
 
 
 def source(root: Node) -> Iterator[Finding]:
-    """Yield findings about the XML elements of a robot file in zero-position XML, or of a world file.
+    """Yield findings about the XML elements of a world file, or of a robot file in zero-position XML, MoBeE's own format for robots.
 
     `root`: the root element; elements of older versions of the format are rewritten to the present version, in place.
     """
@@ -229,7 +230,10 @@ def check_file(
 
 
 def _require_known(name_or_path: str | Path) -> None:
-    """Raise RobotFileError for a folder, and UnknownName for a name of neither a robot nor a world."""
+    """Raise RobotFileError if the argument is the path of a folder, and UnknownName if it is a name that no robot and no world has.
+
+    An argument without a folder and without a suffix (such as .xml) counts as a name.
+    """
     given, path = str(name_or_path), Path(name_or_path)
     known = {*shipped_robots(), *shipped_worlds()}
     if given in known:

@@ -135,7 +135,11 @@ def _check_link(subject: Subject, solids: list[Shape], around: list[Shape]) -> I
 
 
 def _not_enclosed(subject: Subject, solids: list[Shape], around: list[Shape]) -> Iterator[Finding]:
-    """Find the solids of one link that its fields do not enclose, the worst first."""
+    """Yield one note that lists the solids of a link that its fields (larger shapes, where forces begin to act) do not enclose.
+
+    `around`: the fields, at least one. The solid that protrudes farthest from the fields comes first. If all are
+    enclosed, nothing is yielded.
+    """
     out = {solid.name: float(np.min([outside(field, surface(solid)) for field in around], axis=0).max()) for solid in solids}
     names = sorted((name for name in out if out[name] >= MIN_EXCESS), key=lambda name: -out[name])
     if names:

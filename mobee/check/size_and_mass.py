@@ -102,7 +102,7 @@ def _turns(subject: Subject, motor: Motor) -> bool:
 
 
 def _is_quarter(motor: Motor) -> bool:
-    """Return whether an end of the range is pi/4, pi/2, ... to three digits, read as degrees."""
+    """Return whether an end of the motor's range [rad] is, to three digits, pi/4, pi/2, ... degrees: radians that were read as degrees."""
     ends = np.abs(motor.limits)
     if ends.max() > TURN_AS_DEGREES:
         return False
@@ -190,7 +190,10 @@ def _astray(subject: Subject, body: Body) -> Iterator[Finding]:
 
 
 def _too_heavy(subject: Subject) -> Iterator[Finding]:
-    """Find motors that cannot hold the robot against its weight; a warning if that is at home."""
+    """Yield a finding for each motor whose largest torque cannot hold the robot against gravity, at home or in a sampled pose.
+
+    It is a warning if the torque is too small at home (`Robot.home`), and a note if it is too small only in a sampled pose.
+    """
     robot = subject.limited
     limits = np.array([motor.max_torque for motor in robot.motor_table])
     at_home = np.abs(gravity_torque(robot, subject.home))

@@ -85,7 +85,11 @@ def _kind(reason: str) -> str:
 
 
 def _reason(robot: Robot, i: int, j: int, met: Mapping[str, set[LinkPair]]) -> str:
-    """Return why two shapes of one role are not tested; `met`: for each role, the pairs of links with some tested shapes."""
+    """Return why two shapes of the same role are not tested for contacts.
+
+    `i`, `j`: numbers of the shapes. `met`: for each role ("solid" or "field"), the pairs of links between which at least one pair of shapes
+    is tested.
+    """
     one, other = robot.shapes[i], robot.shapes[j]
     links = frozenset((one.link, other.link))
     if one.link == other.link:
@@ -265,10 +269,11 @@ def _parting(subject: Subject, contact: Contact) -> str:
 
 
 def foreign_solids(subject: Subject) -> Iterator[Finding]:
-    """Yield a note for each pair of parts if, at home, a field of one overlaps a solid of the other, but causes no repulsive force there.
+    """Yield notes about fields that overlap a solid of another part in the home pose, but cause no repulsive force there.
 
-    Fields are volumes around solids. A force acts only between two fields that overlap, and this field has no contact with a field of the
-    solid's link. The note gives the deepest such overlap of the two parts.
+    Fields are volumes around the solids of links. A repulsive force acts only if two fields overlap. So there is no force if the field
+    has no contact with a field of the link to which the solid belongs. There is one note for each pair (part of the field, part of the
+    solid), about the deepest overlap.
     """
     deepest: dict[tuple[str, str], tuple[Shape, Shape, float]] = {}
     for field, solid, depth in subject.foreign:
@@ -319,8 +324,12 @@ def leave_out_touching(urdf: str | Path, out: Path | None = None, **options: Any
 
     `out`: path of the SRDF; None: the SRDF that `load_robot` reads with this URDF, or a new one beside the URDF. The text of an existing
     SRDF is kept, and lines are added to it. The file is written completely or not at all. `options`: keyword arguments of `load_robot`.
-    Raises RobotFileError, and InvalidValue if `urdf` is not a URDF, if the name of the SRDF does not end in .srdf, or if `options` names
-    another SRDF and `out` exists already.
+
+    Raises:
+        RobotFileError: the URDF or SRDF cannot be read, the SRDF cannot be written, or several links of the URDF are in one line.
+        UnknownName: `urdf` is a name without a folder and suffix, and no robot has this name.
+        InvalidValue: `urdf` is not a URDF, or an option is not valid; or the name of the SRDF to be written does not end in .srdf; or
+            `out` exists already, and the option `srdf` names another SRDF.
     """
     path = find_file(urdf, ROBOTS, "robot")
     if path.suffix.lower() != ".urdf":

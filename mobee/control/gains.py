@@ -140,9 +140,9 @@ class Gains:
         The time constant C/K is 0.32 s. The experiment `gain-tuning` chose the numbers, with simulated motors that have lag and delay, and
         commands up to three ticks old at 100 Hz. With a stiffer contact the robot begins to oscillate; with stronger springs, which pull
         the motors to the attractor (their goal positions), its links pass through the fields. The springs of torso and shoulders are
-        weaker, because many motors push a hand together. The contact force on a part is bounded by its norm, 35 rad/s^2. This is more than
-        the norm of the largest spring forces of the seven motors of an arm without its hand, 28 rad/s^2. So the force can rise steeply with
-        the depth of a contact, but cannot grow without limit.
+        weaker, because the forces of the springs of many motors add up at a hand. The contact force on a part is bounded by its norm, 35
+        rad/s^2. This is more than the norm of the largest spring forces of the seven motors of an arm without its hand, 28 rad/s^2. So the
+        force can rise steeply with the depth of a contact, but cannot grow without limit.
         """
         return cls(
             law="default",
@@ -202,7 +202,10 @@ class Gains:
 
     @classmethod
     def named(cls, name: str) -> Gains:
-        """Return the set of gains with the name "default", "derived" or "published_2014"; raises UnknownName for another name."""
+        """Return the set of gains with the name "default", "derived" or "published_2014"; raises UnknownName for another name.
+
+        "derived" is for robots whose fields `mobee.derive` computed; "published_2014" are the gains of the original program.
+        """
         sets = {"default": cls.default, "derived": cls.derived, "published_2014": cls.published_2014}
         if name not in sets:
             raise UnknownName("gain set", name, sets)
@@ -246,7 +249,7 @@ class Gains:
         return _first_match((*self._changed("weight"), *self.weights), motors, 1.0)
 
     def _changed(self, name: str) -> Changes:
-        """Return the patterns that change a gain, each with the value."""
+        """Return pairs (pattern of motor names, value) from `motors` and `groups` that change the gain `name`, highest priority first."""
         chosen = (*self.motors, *self.groups)
         return tuple((pattern, value) for pattern, changes in chosen for changed, value in changes if changed == name)
 

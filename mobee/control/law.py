@@ -115,7 +115,10 @@ class Law:
 
 
 def _motors(robot: Robot, gains: Gains, speed_scale: float) -> Table:
-    """Return a row for each motor."""
+    """Return the table with the gains, limits and units of each motor, one row per motor, as the compiled core reads it.
+
+    `speed_scale`: factor on the largest speed of the motors.
+    """
     table: Table = np.zeros(len(robot.motor_table), dtype=core.MOTOR_GAINS)
     table["low"], table["high"] = robot.limits.T
     for name in _OF_MOTORS:
@@ -134,7 +137,11 @@ def _motors(robot: Robot, gains: Gains, speed_scale: float) -> Table:
 
 
 def _clauses(clauses: Sequence[Clause], gains: Gains, units: Array) -> tuple[Table, Table, Table]:
-    """Return three tables: the clauses as intervals of rows, the rows with intervals of entries, and the entries."""
+    """Return the tables of clauses, rows and entries that the compiled core reads.
+
+    A clause (condition on motor positions) has one or more rows a.q + b > 0, a row has an entry for each factor of `a` that is not 0. The
+    first table has for each clause the interval of its rows in the second, which has for each row the interval of its entries in the third.
+    """
     spans, rows, entries = list[tuple[int, int]](), list[tuple[float, float, tuple[int, int]]](), list[tuple[int, float, float]]()
     for clause in clauses:
         spans.append((len(rows), len(rows) + len(clause.b)))
@@ -249,7 +256,11 @@ def stability_bound(robot: Robot, gains: Gains) -> Bound:
 
 
 def _stiffness(robot: Robot, gains: Gains) -> Array:
-    """Return the stiffness of all springs at their steepest, each motor in its unit of `motor_units`, symmetric, (n, n) in 1/s^2."""
+    """Return the largest possible stiffness of all springs together, a symmetric matrix (n, n) in 1/s^2.
+
+    The springs are those of the goal, the limit zones and the clauses (conditions on motor positions); each counts with the largest slope
+    of its force. Positions are in the units of `motor_units`.
+    """
     single = gains.of_robot("stiffness", robot) + gains.of_robot("max_limit", robot) / gains.of_robot("limit_width", robot)
     rows = stack_clauses([replace(clause, a=clause.a * motor_units(robot)) for clause in robot.clauses], len(robot.motors))
     slope = gains.max_constraint / gains.constraint_width

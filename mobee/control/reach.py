@@ -180,8 +180,8 @@ class Reacher:
         """Begin to pull `marker` to `position` (3,) m, root frame.
 
         `normal`: (3,), root frame, wanted direction of the marker's normal; None: any. `tolerance`: m, error at which the target counts as
-        reached; an error of 1 rad between the normals counts as 0.1 m. Raises UnknownName, and InvalidValue, also if the marker is moved by
-        none of the motors that may move.
+        reached; an error of 1 rad between the normals counts as 0.1 m. Raises UnknownName for an unknown marker. Raises InvalidValue for a
+        position, normal or tolerance that is not valid, or if none of the motors that may move moves the marker.
         """
         if not 0 < tolerance < np.inf:
             raise InvalidValue(f"tolerance {tolerance} m: must be a finite distance above 0")
@@ -336,7 +336,11 @@ class Reaches:
 
 
 def _first(robot: Robot, part: str | None) -> int:
-    """Return the motor that identifies a part in the core; -1 for a reach of the whole body, for whose end no action of a part waits."""
+    """Return the number of the first motor of a part, by which the core identifies the part; -1 for None (the whole body).
+
+    An action of a part that has settled waits for the reach of this part while its marker still approaches the target. No action waits for
+    a reach of the whole body, because -1 is the number of no motor.
+    """
     return -1 if part is None else robot.part(part).start
 
 

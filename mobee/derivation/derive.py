@@ -144,7 +144,11 @@ def _reach(robot: Robot, arms: Sequence[Arm]) -> float:
 
 
 def _arms(robot: Robot, seed: int) -> tuple[Robot, tuple[Arm, ...]]:
-    """Return the robot with a part for each arm, unless it has parts, and the arms that learn."""
+    """Return the robot, and the arms (chains of joints) whose motors should learn, at most one for each part.
+
+    A robot with one part is divided: each arm and each hand becomes a part, and all other motors are one part. Raises InvalidValue if no
+    motor moves the end of a chain.
+    """
     drive = {joint: index for index, motor in enumerate(robot.motor_table) for joint, _, _ in motor.joints}
     found: list[tuple[Arm, Chain]] = []
     taken: set[int] = set()

@@ -89,7 +89,11 @@ def _counts(pose: Pose) -> Counter[tuple[int, int]]:
 
 
 def _short_levers(pose: Pose, short: float) -> set[tuple[int, int]]:
-    """Return the pairs of shapes that limits or clauses can keep apart and whose levers are mostly shorter than `short` least levers."""
+    """Return the pairs of shapes with short levers that limits or clauses can keep apart (see `can_cut`).
+
+    The lever of a contact is the norm of the derivatives of its depth by the motors. The levers of a pair are short if their median over
+    its contacts in the poses of `pose` is below `short` times `Robot.least_lever`.
+    """
     robot, table = pose.robot, pose.table
     rows: dict[tuple[int, int], list[int]] = {}
     for row, (first, second) in enumerate(table.numbers[:, [2, 3]].tolist()):
@@ -214,7 +218,11 @@ def home_apart(robot: Robot, reach: float, seed: int) -> Array:
 
 
 def _with_fields(robot: Robot, pairs: Ints, width: float, suffix: str, seed: int, short: float) -> tuple[Robot, Ints]:
-    """Add fields of one width for these pairs of solids; return the robot and the pairs for which the fields meet too often."""
+    """Add fields of one width for these pairs of solids; return the robot and the pairs (r, 2) of solids that do not get them.
+
+    `width`: m. `suffix`: end of the names of the fields. A pair gets none under the conditions in `with_fields`: the fields overlap too
+    often or at home, or the pair has short levers (see `short` there).
+    """
     needed = sorted(set(pairs.ravel().tolist()))
     fields = [_field(robot.shapes[index], width, suffix) for index in needed]
     known = {shape.name: index for index, shape in enumerate(robot.shapes)}
@@ -311,7 +319,10 @@ class _Group:
 
 
 def _groups(robot: Robot, pairs: Ints, seed: int) -> Iterator[_Group]:
-    """Yield the groups of links with few motors of one part between them, the fewest motors first."""
+    """Yield groups of pairs of shapes, the fewest motors first; in a group, the same motors move the links of all pairs against each other.
+
+    Only groups with one to three motors of one part (`can_cut`), some of whose solids touch in random poses, are yielded.
+    """
     of: dict[tuple[int, ...], list[list[int]]] = {}
     for pair in pairs.tolist():
         links: LinkPair = frozenset(robot.shapes[index].link for index in pair)
@@ -350,7 +361,10 @@ def _cuts(group: _Group) -> Iterator[tuple[Array, float]]:
 
 
 def _candidates(touching: Array, free: Array) -> Iterator[tuple[float, Array, float]]:
-    """Yield cuts with their cost: the number of free positions lost per touching position that is excluded."""
+    """Yield possible cuts (half-spaces normal . x > offset, a condition on motor positions x) as tuples (cost, normal, offset).
+
+    The cost is (free positions that the cut excludes + 1) / (touching positions that it excludes), times ALONE for a cut by one motor.
+    """
     count = touching.shape[1]
     axes = [sign * axis for axis in np.eye(count) for sign in (1.0, -1.0)]
     chosen = touching[:: max(1, len(touching) // DIRECTIONS)]

@@ -124,7 +124,11 @@ class RobotVectorEnv(VectorEnv[Any, Any, Any]):
         self._over = np.zeros(num_envs, dtype=bool)
 
     def _restart_all(self, seed: int | Sequence[int | None] | None) -> None:
-        """Begin all episodes; random generators with a seed are new, as in separate environments."""
+        """Begin all episodes.
+
+        `seed`: one number for each robot, or one number, to which the number of the robot is added. A robot with a seed gets a new random
+        generator, as a separate environment would; one with None keeps its generator.
+        """
         if seed is None:
             seeds: Sequence[int | None] = [None] * self.num_envs
         else:

@@ -129,7 +129,9 @@ class TableEnv(ParallelEnv[str, int, int]):  # type: ignore[misc]  # PettingZoo 
     ) -> tuple[dict[str, int], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
         """Begin the actions of the parts at rest, and simulate until at least one part has ended its action.
 
-        `actions`: by agent. Return states, rewards, terminated (always False), truncated and infos, each a dict by agent.
+        `actions`: a dict from the agent to its action; actions of parts that still move, and actions that the state does not have, are
+        ignored. Return states, rewards, terminated (always False), truncated (True after `steps` steps) and infos, each a dict by agent.
+        The infos are explained at the class.
         """
         for part in self.agents:
             if part not in self._under_way and part in actions:

@@ -137,8 +137,9 @@ class CuriousLearner:
         settings: settings of the learner.
 
     Raises:
-        UnknownName: no such explorer or divergence.
-        InvalidValue: a goal that the space does not have, or that the explorer ignores.
+        UnknownName: there is no such explorer, or no such divergence (the measure for the reward of an observation).
+        InvalidValue: a goal that the space does not have or that the explorer ignores, a goal weight without a goal, or a detector with
+            `forgetting` below 1.
     """
 
     def __init__(self, space: Space, settings: CuriousSettings) -> None:
@@ -235,5 +236,9 @@ class CuriousLearner:
             self._explore_by(explorer)
 
     def _pursued(self) -> Array:
-        """Return the reward (S, A) for plans: that of the model, or of the agent's goal."""
+        """Return the reward (S, A) with which plans are computed.
+
+        Without a goal of the agent it is the model's (intrinsic) reward. With a goal it is the goal's (external) reward, alone or with
+        a weight added to the model's (`combined`).
+        """
         return self.model.reward if self._external is None else self._external.combined(self.model.reward)

@@ -75,7 +75,10 @@ def _candidates(points: Array, count: int) -> Iterator[Ints]:
 
 
 def _drawn(state: int, candidates: Ints, points: Array, count: int, rng: np.random.Generator) -> Ints:
-    """Return the `count` nearest candidates without the state itself, ties at the last rank drawn, ascending."""
+    """Return the indices of the `count` candidates that are nearest to the point of a state, ascending; the state itself is left out.
+
+    If several candidates are equally far and not all of them are needed, `rng` chooses among them.
+    """
     others = candidates[candidates != state]
     distance = np.round(((points[others] - points[state]) ** 2).sum(axis=1), DISTANCE_DECIMALS)
     last = np.partition(distance, count - 1)[count - 1]
@@ -132,5 +135,5 @@ def table_of(edges: Edges, states: int) -> Ints:
 
 
 def _ranks(counts: Ints) -> list[int]:
-    """Return the rank of each edge among those of its state."""
+    """Return the number of each edge among the edges of its state: 0, 1, ... `counts`: (S,) number of edges from each state."""
     return [rank for count in counts.tolist() for rank in range(count)]

@@ -70,7 +70,10 @@ def _graph(space: Space) -> Any:
 
 
 def _steps(graph: Any, sources: Ints) -> Array:
-    """Return the number of edges from the nearest source to each state, shape (S,), infinite if there is no path."""
+    """Return the number of edges from the nearest source to each state, shape (S,), infinite if there is no path.
+
+    `graph`: sparse matrix (S, S), as `_graph` returns it. `sources`: indices of states.
+    """
     from scipy.sparse.csgraph import dijkstra
 
     found: Array = dijkstra(graph, indices=sources, unweighted=True, min_only=True)

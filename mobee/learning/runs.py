@@ -25,9 +25,9 @@ class Runs:
     """The R hypotheses about the present run of an action, the longest run first. A run is the time since the action's outcomes changed.
 
     `weight`: (R, H) probability of each run, given each of the H hazards in HAZARDS; a hazard is the probability of a change before the
-    action is performed once more. `counts`: (R, B) number of each of the B outcomes since the run began. `suspected`: the largest increase
-    of the probability that a neighbouring action has changed, since this action was last performed; 0 if there was none. If the neighbour
-    has changed, this action may have changed with it.
+    action is performed once more. `counts`: (R, B) number of each of the B outcomes since the run began. `suspected`: if a neighbouring
+    action changes, this action may change with it; `suspected` is the largest increase of the probability of a neighbour's change that was
+    found since this action was last performed; 0: none was found.
     """
 
     weight: Array
@@ -99,7 +99,10 @@ class OutcomeRuns:
         return known
 
     def _after(self, runs: Runs, chosen: int) -> tuple[Runs, Array]:
-        """Return the runs after one more outcome, and its probability given each hazard, (H,) up to a common factor."""
+        """Return the runs of an action after one more outcome, with the index `chosen`, and the evidence of this outcome, (H,).
+
+        The evidence is the probability of the outcome given each of the H hazards, up to a common factor.
+        """
         prior = (STAY, GOAL)[chosen] if chosen < 2 else OTHER
         total = STAY + GOAL + OTHER
         likely = (runs.counts[:, chosen] + prior) / (runs.counts.sum(axis=1) + total)
@@ -110,7 +113,10 @@ class OutcomeRuns:
         return Runs(weight / evidence, counts), evidence
 
     def _informed(self, evidence: Array) -> Array:
-        """Return the probabilities of the hazards, (H,), after an outcome with this evidence."""
+        """Return the probabilities (H,) of the hazards (probabilities of a change) after an outcome.
+
+        `evidence`: (H,), the probability of the outcome given each hazard, up to a common factor.
+        """
         hazard: Array = self._hazard * evidence / (self._hazard @ evidence)
         return hazard
 
@@ -119,11 +125,15 @@ class OutcomeRuns:
         return expected
 
     def _changed(self, runs: Runs) -> float:
-        """Return the probability that the longest run is over."""
+        """Return the probability that the action has changed since its longest run (the first hypothesis in `runs`) began."""
         return float((runs.weight[1:] @ self._hazard).sum())
 
     def _suspect(self, state: int, action: int, rise: float) -> list[tuple[int, int]]:
-        """End the runs of the neighbours with the probability that they have changed too; returns those that had been tried."""
+        """Add to each neighbour of an action that was tried the hypothesis that its run has ended, because it has changed too.
+
+        The hypothesis has the probability `rise` times the expected share of neighbours that change. `rise`: increase of the probability
+        that the action has changed. Returns these neighbours as (state, action).
+        """
         share, found = rise * self._shared / (self._shared + self._unshared), []
         goal = int(self._goals[state, action])
         to_goal = [(int(one), int(other)) for one, other in np.argwhere(self._goals == goal)]

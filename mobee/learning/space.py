@@ -2,7 +2,8 @@
 """The state-action space of one part: states are the Voronoi cells of samples, and actions aim at samples (thesis 6.2, 6.3).
 
 `Space` has given samples and goals. `Voronoi` draws its samples at random, and its actions aim at the nearest samples. `pruned` and
-`with_shortcuts` adapt a space to observed transitions: without unreachable states, and with shortcuts (thesis 9.4.5).
+`with_shortcuts` adapt a space to observed transitions: the first removes unreachable states, the second adds shortcuts, which are actions
+between states that often followed each other within a few transitions (thesis 9.4.5).
 """
 
 from __future__ import annotations
@@ -110,7 +111,8 @@ class Space:
 
         `q`: rad, shape (n_part,): positions of all motors of the part, as a plant measures them. If the space has fewer joints than the
         part has motors, `q` may also be the positions of these joints alone, shape (d,), in the order of `joints`. If several samples are
-        equally near, a `Lattice` returns the lowest state number. Raises InvalidValue for another shape or values that are not finite.
+        equally near, a `Lattice` returns the lowest state number; for other spaces it may be any of them. Raises InvalidValue for another
+        shape or values that are not finite.
         """
         given = real_array(f"q of {self.part}", q)
         if given.shape == self._targets.shape[1:]:

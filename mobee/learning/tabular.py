@@ -321,7 +321,11 @@ def half_space(
 
 
 def _cells(space: Lattice, mean: Array, deviation: float) -> list[tuple[int, float]]:
-    """Return the states of a normally distributed pose, with their probabilities: cells of a lattice are boxes."""
+    """Return pairs (state, probability) for a normally distributed pose of the joints; probabilities up to NEGLIGIBLE (1e-4) are left out.
+
+    `mean`: (d,) mean pose, as fractions of the joints' ranges. `deviation`: standard deviation of each joint, in the same unit. A state is
+    the box of poses that are nearest to its sample.
+    """
     each = []
     strides = lattice_strides([len(levels) for levels in space.levels])
     for stride, levels, x in zip(strides.tolist(), space.levels, mean.tolist(), strict=True):

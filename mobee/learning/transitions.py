@@ -261,8 +261,9 @@ class TransitionModel(Tabled):
     def totals(self) -> Array:
         """The sum of the counts of each state-action, N in the closed form of eq. 6.5, (S, A); 0 where there is no action (read only).
 
-        It is the sum over the bins (the distinct outcomes), imagined counts included. With the divergence "kl" it is the sum of the real
-        counts plus one imagined count for each state of the space.
+        It is the sum over the bins (the distinct outcomes) of real and imagined counts; imagined counts are a prior: outcomes that are
+        counted before they were observed. With the divergence "kl" it is the sum of the real counts plus one imagined count for each state
+        of the space.
         """
         return read_only(self._totals)
 
@@ -345,7 +346,10 @@ class TransitionModel(Tabled):
         return max(0.0, kl_divergence(after, before))
 
     def _observe_since_change(self, state: int, action: int, outcome: int) -> float:
-        """Count one transition, and forget the outcomes before a change; the rewards of other state-actions that may have changed rise."""
+        """Count one transition, forget the outcomes before a change, and return the reward of the transition in nats.
+
+        If neighbours of the state-action (see `OutcomeRuns`) may have changed too, each gets at least the reward of its likeliest outcome.
+        """
         assert self._runs is not None
         reward, chosen = self._gain_since_change(state, action, outcome), self._bin(state, action, outcome)
         if chosen == self._outcomes.shape[2]:
@@ -407,7 +411,7 @@ class TransitionModel(Tabled):
             raise InvalidValue(f"{self.space.part} has no state {outcome!r}: valid are 0 to {len(self.space) - 1}.")
 
     def _widen(self) -> None:
-        """Add one more bin."""
+        """Make room for one more bin (distinct outcome) of each state-action in the arrays of counts, probabilities and outcomes."""
         self._imagined = np.append(self._imagined, NEW_BIN)
         self._counts, self._probabilities = widened(self._counts), widened(self._probabilities)
         self._outcomes = widened(self._outcomes)

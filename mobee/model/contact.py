@@ -83,7 +83,7 @@ class ContactTable:
 
     @property
     def numbers(self) -> Column:
-        """The integer columns of all contacts, (c, 6): pose, kind, first, second, first link, second link."""
+        """The integer columns of all contacts, (c, 6): pose, kind, first, second, first link, second link; see these properties."""
         return self._arrays()[0]
 
     @property
@@ -113,7 +113,7 @@ class ContactTable:
 
     @property
     def first_link(self) -> Column:
-        """The index of the link of each first volume, (c,)."""
+        """The index of the link of each first volume, (c,), never -1: if that volume is an attached object, the link that carries it."""
         return self.numbers[:, 4]
 
     @property

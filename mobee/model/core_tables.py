@@ -96,7 +96,8 @@ def volume_row(volume: Volume) -> Volumes:
 def convex_row(volume: Volume, vertices: Array, first: int) -> Volumes:
     """Return the description of a convex volume for the core: a 0-dimensional array of the type VOLUME.
 
-    `vertices`: (v, 3) m, relative to its position. `first`: index of the first vertex in the core's table of corners.
+    `vertices`: (v, 3) m, relative to the position of the volume, along its own axes. `first`: index of the first vertex in the core's table
+    of corners.
     """
     return _row(volume, [first, len(vertices), 0.0], bound(volume, vertices))
 
@@ -122,16 +123,16 @@ class RobotTables:
     """The tables of a robot that core/robot.cpp reads: S shapes, sorted by their C clusters; J joints; V corners of convex shapes.
 
     A cluster is a group of shapes with one bounding sphere. `motors`: number of motors. `own_shapes`: number of shapes that are not carried
-    objects. `least_lever`: m, as in `mobee.robot.robot.Robot`. Joints: `parent` (J,) the link that carries the joint; `slides` (J,) whether
-    it is prismatic; `border` (J,) whether the link that the joint moves belongs to another part than `parent`; `axis` (J, 3) and `point`
-    (J, 3) m of the axis, root frame, zero pose; `motor` (K, J) indices of the motors that drive the joint, at most K; `scale` (K, J) joint
-    angle per motor angle, 0 in unused entries; `offset` (J,) joint angle while the motors are at 0; `travel` (K, J) motion of the joint
-    [rad or m] when the motor moves by its unit (1 rad, or a length for a slide, see `mobee.robot.motor_units.motor_units`). Shapes:
-    `volume` (S,) of the dtype VOLUME; `link` (S,) index of its link; `name` (S,) index into the robot's shapes,
-    then the carried objects; `field` (S,) whether it is a field, which causes repulsive forces; `meets_world` (S,) whether it is tested
-    against free objects; `cluster` (C + 1,) first shape of each cluster; `tested` (S, S) whether two shapes are tested against each other.
-    Corners: `corner` (V, 3) m, relative to the position of the shape, along its axes; `edge_start` (V + 1,) index in `edge` of the first
-    edge of each corner; `edge`: the corner at the other end, as its index among the corners of the shape.
+    objects. `least_lever`: m; above 0: contacts with a short lever push more strongly, see `mobee.robot.robot.Robot`. Joints: `parent` (J,)
+    the link that carries the joint; `slides` (J,) whether it is prismatic; `border` (J,) whether the link that the joint moves belongs to
+    another part than `parent`; `axis` (J, 3) and `point` (J, 3) m of the axis, root frame, zero pose; `motor` (K, J) indices of the motors
+    that drive the joint, at most K; `scale` (K, J) joint angle per motor angle, 0 in unused entries; `offset` (J,) joint angle while the
+    motors are at 0; `travel` (K, J) motion of the joint [rad or m] when the motor moves by its unit (1 rad, or a length for a slide, see
+    `mobee.robot.motor_units.motor_units`). Shapes: `volume` (S,) of the dtype VOLUME; `link` (S,) index of its link; `name` (S,) index into
+    the robot's shapes, then the carried objects; `field` (S,) whether it is a field, which causes repulsive forces; `meets_world` (S,)
+    whether it is tested against free objects; `cluster` (C + 1,) first shape of each cluster; `tested` (S, S) whether two shapes are tested
+    against each other. Corners: `corner` (V, 3) m, relative to the position of the shape, along its axes; `edge_start` (V + 1,) index in
+    `edge` of the first edge of each corner; `edge`: the corner at the other end, as its index among the corners of the shape.
     """
 
     motors: int
@@ -359,7 +360,11 @@ def _merge(robot: Robot, members: list[list[int]], centers: Array, bound: Array)
 
 
 def _radius(centers: Array, bound: Array, group: list[int]) -> float:
-    """Return the radius of the sphere about the group's mean that contains it, averaged over the sampled poses."""
+    """Return the radius [m] of the sphere around a group of shapes, averaged over the sampled poses.
+
+    The centre of the sphere is the mean of the shapes' positions. `centers`: (poses, S, 3) m. `bound`: (S,) m, radius of each shape around
+    its own position. `group`: indices of the shapes.
+    """
     inside = centers[:, group]
     between = inside - inside.mean(axis=1, keepdims=True)
     return float((np.sqrt((between * between).sum(axis=2)) + bound[group]).max(axis=1).mean())

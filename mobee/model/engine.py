@@ -176,7 +176,10 @@ class _Room(core.Room):
         self.cut = False
 
     def ask_for(self, scene: Scene, reaching: Hands, cut: bool) -> Scene:
-        """Set the scene, the reaching hands and `cut` for the next evaluations of one pose, and return the scene."""
+        """Set the scene, the reaching hands and `cut` for the next evaluations of one pose, and return the scene.
+
+        `cut`: whether a contact acts only on the motors of the touching link's own part, as in the MoBeE program of 2014.
+        """
         self.ask(scene.handle, hand_numbers(reaching), cut)
         self.scene, self.reaching, self.cut = scene, reaching, cut
         return scene
@@ -213,7 +216,8 @@ class Engine:
         """Return all contacts in the poses q (B, n) rad, and their projection to the motors, (B, n) m^2/rad.
 
         The projection is the sum of J^T (depth * normal) over the contacts of fields. Fields are volumes that cause repulsive forces; J is
-        the Jacobian of the contact's point. `snapshot`: the state of the world. `reaching`: the hands that reach for targets; their
+        the Jacobian of the contact's point. If `robot.least_lever` is above 0, each depth * normal is multiplied by a factor
+        (`mobee.model.kinematics.push_factors`). `snapshot`: the state of the world. `reaching`: the hands that reach for targets; their
         contacts with targets are ignored. `cut`: True: a contact acts only on the motors of the touching link's own part, as in the MoBeE
         program of 2014; False: also on the motors nearer to the base. `threads`: number of threads; the results do not depend on it.
         """
@@ -230,8 +234,9 @@ class Engine:
         """Return the contacts of one pose, and their projection to the motors, (n,) m^2/rad.
 
         The projection is the sum of J^T (depth * normal) over the contacts of fields. Fields are volumes that cause repulsive forces; J is
-        the Jacobian of the contact's point. `q`: the pose (n,) rad as bytes of float64. `snapshot`: the state of the world. `reaching`: the
-        hands that reach for targets; their contacts with targets are ignored. `cut`: True: a contact acts only on the motors of the
+        the Jacobian of the contact's point. If `robot.least_lever` is above 0, each depth * normal is multiplied by a factor
+        (`mobee.model.kinematics.push_factors`). `q`: the pose (n,) rad as bytes of float64. `snapshot`: the state of the world. `reaching`:
+        the hands that reach for targets; their contacts with targets are ignored. `cut`: True: a contact acts only on the motors of the
         touching link's own part, as in the MoBeE program of 2014; False: also on the motors nearer to the base.
         """
         try:
@@ -309,7 +314,8 @@ class Neighbours:
         """Return all contacts in the consecutive poses q (B, n) rad, and their projection to the motors, (B, n) m^2/rad.
 
         The projection is the sum of J^T (depth * normal) over the contacts of fields. Fields are volumes that cause repulsive forces; J is
-        the Jacobian of the contact's point. `snapshot`: the state of the world. `reaching`: the hands that reach for targets; their
+        the Jacobian of the contact's point. If `robot.least_lever` is above 0, each depth * normal is multiplied by a factor
+        (`mobee.model.kinematics.push_factors`). `snapshot`: the state of the world. `reaching`: the hands that reach for targets; their
         contacts with targets are ignored.
         """
         self.enter(snapshot, reaching)

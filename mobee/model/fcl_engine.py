@@ -77,9 +77,10 @@ class FclEngine:
         """Return the contacts of one pose, and their projection to the motors, (n,) m^2/rad.
 
         The projection is that of `contacts`: the sum of J^T (factor * depth * normal) over the contacts of fields (volumes that cause
-        repulsive forces). `q`: the pose (n,) rad as bytes of float64. `snapshot`: the state of the world. `reaching`: the hands that reach
-        for targets; their contacts with targets are ignored. `cut`: True: a contact acts only on the motors of the touching link's own
-        part, as in the MoBeE program of 2014; False: also on the motors nearer to the base.
+        repulsive forces); the factors are those of `mobee.model.kinematics.push_factors`, 1 if `robot.least_lever` is 0. `q`: the pose (n,)
+        rad as bytes of float64. `snapshot`: the state of the world. `reaching`: the hands that reach for targets; their contacts with
+        targets are ignored. `cut`: True: a contact acts only on the motors of the touching link's own part, as in the MoBeE program of
+        2014; False: also on the motors nearer to the base.
         """
         table, torque = self.contacts(np.frombuffer(q)[None], snapshot, reaching, cut)
         return table, torque[0]
@@ -219,7 +220,10 @@ def _primitive(kind: str, size: tuple[float, ...]) -> Any:
 
 @lru_cache(maxsize=4096)
 def _hull(vertices: bytes) -> Any:
-    """Return the hull of vertices (v, 3). Its faces are only hints: given an open one, fcl checks every vertex."""
+    """Return the convex hull of vertices, given as the bytes of (v, 3) float64, as a shape of fcl.
+
+    Only one face is given, so the surface is open, and fcl then compares all vertices, not only neighbours along faces.
+    """
     points = np.frombuffer(vertices).reshape(-1, 3)
     return fcl.Convex(points, 1, np.array([3, 0, 1, 2]))
 
@@ -233,10 +237,10 @@ def tested_pairs(robot: Robot, snapshot: Snapshot, reaching: Hands) -> tuple[Int
     Fields are volumes that cause repulsive forces. Volumes are numbered: first the robot's shapes, then the world's objects. Pairs of the
     robot's own shapes are those in its lists `solid_pairs` and `field_pairs`. A free object (one that is not attached to a link) is tested
     against every shape except those of the base; if it is a target, it is not tested against the hands in `reaching`, which reach for it.
-    The kind of a pair of a shape and an object is the role of the shape. An attached object counts as a solid of its link. It is tested
-    against free objects, and against the shapes and attached objects of other links, except if the pair of links is in
-    `robot.untested`. Ghosts, objects that are only drawn, are not tested. Raises UnknownName for an object that is attached to a link which
-    the robot does not have.
+    The kind of a pair of a shape and an object is that of the shape: 0 for a solid, 1 for a field. An attached object counts as a solid of
+    its link. It is tested against free objects, and against the shapes and attached objects of other links, except if the pair of links is
+    in `robot.untested`. Ghosts, objects that are only drawn, are not tested. Raises UnknownName for an object that is attached to a link
+    which the robot does not have.
     """
     own = [(int(a), int(b), kind) for kind, pairs in ((SOLID, robot.solid_pairs), (FIELD, robot.field_pairs)) for a, b in pairs]
     roles = [FIELD if shape.role == "field" else SOLID for shape in robot.shapes]

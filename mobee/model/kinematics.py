@@ -86,9 +86,10 @@ def _ancestry(joints: tuple[Joint, ...]) -> tuple[Ints, ...]:
 
 
 def _doubling_rounds(joints: tuple[Joint, ...]) -> tuple[tuple[Ints, Ints], ...]:
-    """Return which links to multiply with which ancestors in each round of pointer jumping.
+    """Return, for each round of the computation of link transforms, the links and the ancestors of these links, two arrays of indices.
 
-    After round r a link's matrix spans its last 2^r joints, so that the longest chain takes log2 rounds.
+    In a round, the matrix of each link is multiplied by that of its ancestor (pointer jumping). After round r it covers the last 2^r joints
+    of the link's chain, so the number of rounds is about log2 of the longest chain.
     """
     ancestor = np.array([0, *(joint.parent for joint in joints)], dtype=np.intp)
     rounds = []
@@ -164,9 +165,9 @@ def _moved_axes(robot: Robot, transforms: Array, joints: Ints) -> tuple[Array, A
 def lever(robot: Robot, transforms: Array, links: tuple[int, int], point: Array, normal: Array) -> float:
     """Return the lever of a contact of two links [m/rad]: the norm of the derivatives of its depth with respect to the motor positions.
 
-    A joint that moves both links does not count. For a motor that slides, a certain length replaces 1 rad, see
-    `mobee.robot.motor_units.motor_units`. `transforms`: (L, 4, 4) of all links. `links`: indices; below 0: a free object (an object of
-    the world that is on no link). `point` (3,) m and `normal` (3,) of the contact: root frame, in this pose.
+    A joint that moves both links does not count. For a motor that slides, the derivative [m/m] is multiplied by the length [m] that the
+    control law treats as 1 rad (`mobee.robot.motor_units.motor_units`). `transforms`: (L, 4, 4) of all links. `links`: indices; below 0: a
+    free object (an object of the world that is on no link). `point` (3,) m and `normal` (3,) of the contact: root frame, in this pose.
     """
     change = np.zeros(len(robot.motors))
     for link, sign in zip(links, (1.0, -1.0), strict=True):
@@ -178,11 +179,12 @@ def lever(robot: Robot, transforms: Array, links: tuple[int, int], point: Array,
 def push_factors(robot: Robot, transforms: Array, links: Ints, depths: Array, points: Array, normals: Array) -> Array:
     """Return the factors (c,) that multiply the repulsive pushes, depth * normal, of c contacts of fields.
 
-    Fields are volumes that cause repulsive forces. The factors are 1 if `robot.least_lever` is 0. Otherwise a factor is LEVER^2 / (lever^2
-    + least_lever^2) * depth / total, with LEVER = 0.5 m; the total is the sum of the depths of all contacts between the same two links.
-    This is our extension of thesis eq. 5.11 (docs/law.md). `transforms`: (L, 4, 4) of all links. `links` (c, 2): indices; all free objects
-    (-1, objects of the world that are on no link) count as one link. `depths` (c,) m, `points` (c, 3) m, `normals` (c, 3): of the contacts,
-    root frame.
+    Fields are volumes that cause repulsive forces. The factors are 1 if `robot.least_lever` is 0. Otherwise a factor is larger if the lever
+    of the contact is shorter (`lever`: the norm of the derivatives of its depth with respect to the motors): it is LEVER^2 / (lever^2 +
+    least_lever^2) * depth / total, with LEVER = 0.5 m; total is the sum of the depths of all contacts between the same two links. This is
+    our extension of thesis eq. 5.11 (docs/law.md). `transforms`: (L, 4, 4) of all links. `links` (c, 2): indices; all free objects (-1,
+    objects of the world that are on no link) count as one link. `depths` (c,) m, `points` (c, 3) m, `normals` (c, 3): of the contacts, root
+    frame.
     """
     factors = np.ones(len(depths))
     if robot.least_lever <= 0.0:

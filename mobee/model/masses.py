@@ -67,7 +67,12 @@ EARTH = (0.0, 0.0, -9.81)  # m/s^2, root frame
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Carriers:
-    """The joints that carry a mass."""
+    """The C joints that carry a mass, with the tables from which gravity torques are computed.
+
+    `joints`: indices of the joints. `carried`: 1 where a joint carries a body (a link's mass), else 0; B bodies. `loads`: mass that each
+    joint carries. `frames`: axis and point of each joint at zero pose. `slides`: whether a joint is prismatic. `drives`: joint motion by
+    motor motion, of n motors.
+    """
 
     joints: Ints  # (C,)
     carried: Array  # (C, B) 1 where the joint carries the link's mass

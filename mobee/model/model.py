@@ -47,9 +47,10 @@ class Model:
         self._hand_of: dict[str, Hand] = {}
 
     def hands(self, reaching: Reaching) -> Hands:
-        """Return the hand of each marker that reaches: the links whose contacts with targets are ignored.
+        """Return a tuple with the hand of each marker that reaches, in the order given: the links whose contacts with targets are ignored.
 
-        `reaching`: name of a marker, names of up to two markers, or None. Raises UnknownName, and InvalidValue for more than two markers.
+        `reaching`: name of a marker, names of up to two markers, or None: an empty tuple. Raises UnknownName for an unknown marker, and
+        InvalidValue for more than two markers.
         """
         markers = () if reaching is None else (reaching,) if isinstance(reaching, str) else tuple(reaching)
         known = self._hands_of.get(markers)
@@ -126,7 +127,8 @@ class Model:
     def jacobian(self, q: ArrayLike, marker: str) -> Array:
         """Return the Jacobian of a marker in the poses q (..., n) rad, (..., 6, n) in the root frame (thesis eq. 5.1).
 
-        The first three rows are linear [m/rad], the last three angular; there is a column for each motor. Raises InvalidValue, UnknownName.
+        The first three rows are linear [m/rad], the last three angular; there is a column for each motor. Raises UnknownName if the robot
+        does not have the marker, and InvalidValue if q has another shape or is not finite.
         """
         value = self._checked(q)
         m = self.robot.marker(marker)
@@ -137,7 +139,8 @@ class Model:
         """Attach a world object to a link, so that it moves with the link from now on.
 
         The object keeps the position and rotation relative to the link that it has while the robot is at q (n,) rad. The pose at q becomes
-        the robot's present pose in the world, as if `World.follow` was called with it. Raises UnknownName and InvalidValue.
+        the robot's present pose in the world, as if `World.follow` was called with it. Raises UnknownName for an unknown object or link,
+        and InvalidValue if q has another length or is not finite.
         """
         pose = self.evaluate(q)
         carrier = link_pose(pose, link)

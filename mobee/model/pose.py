@@ -25,7 +25,8 @@ class Finder(Protocol):
         """Return all contacts in the poses q (B, n) rad, and their projection to the motors, (B, n) m^2/rad.
 
         The projection is the sum of J^T (depth * normal) over the contacts of fields. Fields are volumes that cause repulsive forces; J is
-        the Jacobian of the contact's point. `snapshot`: the state of the world. `reaching`: the hands that reach for targets; their
+        the Jacobian of the contact's point. If `robot.least_lever` is above 0, each depth * normal is multiplied by a factor
+        (`mobee.model.kinematics.push_factors`). `snapshot`: the state of the world. `reaching`: the hands that reach for targets; their
         contacts with targets are ignored.
         """
 
@@ -50,7 +51,8 @@ class Engine(Protocol):
         """Return all contacts in the poses q (B, n) rad, and their projection to the motors, (B, n) m^2/rad.
 
         The projection is the sum of J^T (depth * normal) over the contacts of fields. Fields are volumes that cause repulsive forces; J is
-        the Jacobian of the contact's point. `snapshot`: the state of the world. `reaching`: the hands that reach for targets; their
+        the Jacobian of the contact's point. If `robot.least_lever` is above 0, each depth * normal is multiplied by a factor
+        (`mobee.model.kinematics.push_factors`). `snapshot`: the state of the world. `reaching`: the hands that reach for targets; their
         contacts with targets are ignored. `cut`: True: a contact acts only on the motors of the touching link's own part, as in the MoBeE
         program of 2014; False: also on the motors nearer to the base. `threads`: number of threads; the results do not depend on it.
         """
@@ -59,8 +61,9 @@ class Engine(Protocol):
         """Return the contacts of one pose, and their projection to the motors, (n,) m^2/rad.
 
         The projection is the sum of J^T (depth * normal) over the contacts of fields. Fields are volumes that cause repulsive forces; J is
-        the Jacobian of the contact's point. `q`: the pose (n,) rad as bytes of float64. `snapshot`: the state of the world. `reaching`: the
-        hands that reach for targets; their contacts with targets are ignored. `cut`: True: a contact acts only on the motors of the
+        the Jacobian of the contact's point. If `robot.least_lever` is above 0, each depth * normal is multiplied by a factor
+        (`mobee.model.kinematics.push_factors`). `q`: the pose (n,) rad as bytes of float64. `snapshot`: the state of the world. `reaching`:
+        the hands that reach for targets; their contacts with targets are ignored. `cut`: True: a contact acts only on the motors of the
         touching link's own part, as in the MoBeE program of 2014; False: also on the motors nearer to the base.
         """
 
@@ -115,7 +118,10 @@ class Pose:
         return link[..., :3] @ m.position + link[..., 3]
 
     def rotation(self, marker: str) -> Array:
-        """Return the rotation of a marker, (..., 3, 3) in the root frame; raises UnknownName if there is no such marker."""
+        """Return the orientation of a marker, (..., 3, 3): the columns are the axes of the marker in the root frame.
+
+        Raises UnknownName if there is no such marker.
+        """
         m = self.robot.marker(marker)
         return self.transforms[..., m.link, :3, :3] @ m.rotation
 

@@ -30,7 +30,10 @@ class Geometry:
     size: tuple[float, ...]
 
     def grown(self, margin: float) -> Geometry:
-        """Return a copy of the shape with its surface moved outward by `margin` m; a negative margin moves it inward."""
+        """Return a copy of the shape with its surface moved outward by `margin` m; a negative margin moves it inward.
+
+        The new lengths are not checked here; `World.add` raises InvalidValue for a length below 1e-9 m.
+        """
         factors = {"sphere": (1.0,), "capsule": (1.0, 0.0), "cylinder": (1.0, 2.0), "box": (2.0, 2.0, 2.0)}[self.kind]
         return Geometry(self.kind, tuple(size + factor * margin for size, factor in zip(self.size, factors, strict=True)))
 

@@ -100,7 +100,8 @@ def config_force(s: State) -> Array:
 def work_force(s: State) -> Array:
     """Return f_work = L(sum over markers m of J(m)^T f_m) (eq. 5.10), (n,) rad/s^2.
 
-    A marker is a point on a link. J(m) is its Jacobian, f_m its force (or force and moment) in `State.pushes`; `bounded_client` is L.
+    A marker is a point on a link. J(m) is its Jacobian, f_m its force (or force and moment) in `State.pushes`. L saturates
+    the sum, see `bounded_client`. The element of a motor that slides is first multiplied by the square of its `motor_units`.
     """
     torque = np.zeros(len(s.q))
     for marker, push in s.pushes.items():
@@ -127,8 +128,8 @@ def squash_together(f: Array, maximum: Array, slope: Array, unit: Array) -> Arra
     """Saturate the norm of the force f (k,) on several motors, so that it keeps its direction.
 
     `maximum`, `slope` (k,): bound m and slope s at 0 of each motor, as in eq. 5.8. `unit` (k,): the motion of each motor that the control
-    law treats as 1 rad (`mobee.robot.motor_units`). With m and f divided by `unit`, the factor of a motor is m / (m / s + |f|). Every
-    element of f is multiplied by the smallest factor.
+    law treats as 1 rad (`mobee.robot.motor_units`). First m and f are divided by `unit`. Then the factor of a motor is m / (m / s + |f|),
+    where |f| is the norm over all k motors. Every element of f is multiplied by the smallest of the k factors.
     """
     length = float(np.linalg.norm(f / unit))
     shares = maximum / unit / (maximum / unit / slope + length)
@@ -163,8 +164,9 @@ def clauses_default(s: State) -> Array:
     """Return f_cst of the default law, (n,) rad/s^2: each clause pushes along the unit normals of all its rows (eqs. 5.15, 5.17).
 
     A clause is a condition on motor positions: a list of rows, inequalities a.q + b > 0, of which at least one must hold. It pushes while
-    no row holds with a margin of `constraint_width`. The size of the push is computed from the row with the largest distance
-    (a.q + b) / |a|, so that the force is continuous.
+    no row holds with a margin of `constraint_width`. The size of this push is `max_constraint` * (1 - d / `constraint_width`), or 0 if this
+    is negative; d is the largest distance (a.q + b) / |a| of the rows. So the size is continuous: 0 where d is `constraint_width`, and
+    `max_constraint` where d is 0.
     """
     unit, total = motor_units(s.robot), np.zeros(len(s.q))
     for clause in s.robot.clauses:
@@ -205,7 +207,8 @@ def projected(robot: Robot, q: Array, contacts: Iterable[Contact], propagate: Li
 
     f_g = depth * normal for the first link, and the opposite for the second. A field is a volume that causes a repulsive force; contacts
     between two solids are left out. `propagate`: "tree": a contact acts on all motors from its link down to the base; "part": only on the
-    motors of the part that touches, as in MoBeE of 2014. If `robot.least_lever` is above 0, f_g is multiplied by `push_factor`.
+    motors of the part that touches, as in MoBeE of 2014. If `robot.least_lever` is above 0, f_g is multiplied by `push_factor`, which
+    strengthens contacts with a short lever (small J(g)).
     """
     frames, per_joint, contacts = link_frames(robot, q), np.zeros(len(robot.joints)), list(contacts)
     for contact in contacts:
@@ -245,9 +248,9 @@ def push_factor(robot: Robot, frames: Array, contact: Contact, contacts: Sequenc
 def bounded_contact(robot: Robot, gains: Gains, torque: Array) -> Array:
     """Saturate the norm of the contact force on each part (L of eq. 5.11, in the form of eq. 5.8); returns (n,) rad/s^2.
 
-    `torque`: the sum in eq. 5.11, (n,) m^2/rad. The force before saturation is `torque` times `gains.contact_gain`. Only if `gains.law` is
-    "published_2014", this product is multiplied by its norm in each part, so that the norm is squared; the result is in deg/s^2, as in the
-    MoBeE program of 2014, and is converted to rad/s^2.
+    `torque`: the sum in eq. 5.11, (n,) m^2/rad. The force before saturation is `torque` times `gains.contact_gain`. If `gains.law` is
+    "published_2014", the force on each part is first multiplied by its own norm, as in the MoBeE program of 2014. That product is in
+    deg/s^2; it is converted to rad/s^2 and then saturated.
     """
     unit = motor_units(robot)
     force = gains.contact_gain * torque * unit

@@ -63,8 +63,9 @@ class Motion:
 def acceleration(state: State, terms: Sequence[Term] = TERMS) -> Array:
     """Return q" of eq. 5.7 with mass 1, (n,) rad/s^2: the sum of all terms, plus C q*' for an attractor that moves.
 
-    `terms`: the forces, each a function of the state. The sum of all forces except `spring` and `damping` reduces the term C q*' where it
-    opposes q*' (`following`). A copy or a wrapper of `spring` or `damping` would be counted in this sum, so do not use one.
+    C is the damping gain, q*' the velocity of the attractor (the pose to which the spring pulls the motors). `terms`: the forces, each a
+    function of the state. All forces except `spring` and `damping` are summed: for a motor whose sum opposes q*', `following` reduces
+    C q*'. A copy or a wrapper of `spring` or `damping` would be counted in this sum, so do not use one.
     """
     total, outside = np.zeros(len(state.q)), np.zeros(len(state.q))
     for term in terms:
@@ -120,9 +121,10 @@ def hold(robot: Robot, motion: Motion, part: str) -> Motion:
 
 
 def torque(robot: Robot, motion: Motion, q: Array) -> Array:
-    """Return the torque command, (n,) N m: the sum of the torques for acceleration, viscous friction and the robot's weight at q (n,) rad.
+    """Return the torque command, (n,) N m (N for a slide): the sum of the torques for acceleration, viscous friction and weight.
 
-    The sum is clipped to the largest torque of each motor.
+    The acceleration and the velocity are those of `motion`; the weight is that of the robot at q (n,) rad. The sum is clipped to the
+    largest torque of each motor.
     """
     most = np.array([motor.max_torque for motor in robot.motor_table])
     wanted = INERTIA * motion.acceleration + FRICTION * motion.velocity + weight_torque(robot, q)

@@ -77,7 +77,10 @@ def read_pieces(source: MeshSource) -> tuple[Piece, ...]:
 
 
 def _scaled(piece: Piece, scale: Array) -> Piece:
-    """Return the piece with its points multiplied by `scale` (3,); a mirror image keeps its outside."""
+    """Return the piece with its points multiplied by `scale` (3,).
+
+    If the scale mirrors the piece (its product is negative), the corners of each triangle are reversed, so that its outside stays outside.
+    """
     triangles = piece.triangles if scale.prod() > 0.0 else piece.triangles[:, ::-1]
     return replace(piece, points=piece.points * scale, triangles=triangles)
 
@@ -193,7 +196,10 @@ def mesh_of(piece: Piece) -> Mesh:
 
 
 def _each_once(rows: NDArray[Any]) -> tuple[Ints, Ints]:
-    """Return the index of the first of each different row (n, k), and for each row the number of the row that is equal to it (n,)."""
+    """Return the indices (u,) of one of each of the u different rows in `rows` (n, k), in ascending order of the rows' values.
+
+    The second result (n,) has for each row the position of its equal in the first.
+    """
     order = np.lexsort(rows.T[::-1])  # np.unique takes several times as long
     new = np.append(True, (rows[order[1:]] != rows[order[:-1]]).any(axis=1))
     number = np.empty(len(rows), dtype=np.intp)

@@ -151,7 +151,10 @@ def _draw_transparent(picture: Floats, seen: Raster, solid: Solid) -> None:
 
 
 def _draw_veiled(picture: Floats, seen: Raster, solids: Sequence[Solid], veil: float) -> None:
-    """Let solids show through the opaque ones in front of them."""
+    """Let `solids` be visible through the opaque solids in front of them, by changing `picture` in place.
+
+    `veil`: share of their colour there, 0 (hidden) to 1 (as if nothing were in front).
+    """
     alone = Raster(seen.camera, solids)
     hidden = np.isfinite(alone.depth) & (alone.depth > seen.depth)
     picture[hidden] = (1.0 - veil) * picture[hidden] + veil * alone.color[hidden]

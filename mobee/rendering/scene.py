@@ -179,7 +179,10 @@ class _Shown:
         self.colors = (np.float32(255.0) * np.array([solids[number].color for number in numbers], np.float32)).reshape(-1, 3)
 
     def at(self, transforms: Array, objects: Mapping[str, Solid]) -> Packed:
-        """Return the solids where links, by their transforms (L, 4, 4), and objects are."""
+        """Place the solids of links and world objects, and return all solids; each call returns the same tables, with new places.
+
+        `transforms`: (L, 4, 4), pose of each link in the root frame. `objects`: the objects' solids at their new places, by name.
+        """
         links = transforms[self._links]
         positions = (links[:, :3, :3] @ self._positions)[..., 0] + links[:, :3, 3]
         rotations = links[:, :3, :3] @ self._rotations

@@ -292,7 +292,7 @@ def write_sheet(rows: Sequence[tuple[str, Sequence[Panel]]], path: Path, colors:
 
 
 def _figure(width: float, height: float) -> Any:
-    """Return an empty figure of this size [inches]; only the texts of a sheet need Matplotlib."""
+    """Return an empty figure of Matplotlib of this size [inches]; raises NotInstalled without Matplotlib."""
     try:
         from matplotlib.figure import Figure
     except ImportError:
@@ -307,7 +307,10 @@ def _row_height(title: str, panels: Sequence[Panel]) -> int:
 
 
 def _write_png(figure: Any, path: Path, colors: int) -> None:
-    """Write a figure with a palette, a third as large as without; rare colours have their share in it, and white stays white."""
+    """Write a figure as a PNG file with a palette of at most `colors` colours; the file is a third as large as without a palette.
+
+    Rare colours have a larger weight in the choice of the palette than in the picture. White stays white.
+    """
     from PIL import Image  # a dependency of Matplotlib
 
     written = io.BytesIO()

@@ -317,7 +317,11 @@ def _meshes(robot: Robot) -> dict[MeshSource, tuple[Mesh, ...]]:
 
 
 def _drawn(visual: Visual, part: str, robot: Robot, meshes: Mapping[MeshSource, tuple[Mesh, ...]]) -> list[LinkSolid]:
-    """Return what a visual draws: a mesh of several colours in these, else in the colour of the robot's file, the mesh's, or the part's."""
+    """Return the solids that draw a visual; none for a mesh that is not in `meshes`.
+
+    A mesh of several colours keeps them. Otherwise, the first known colour is used: that of the visual in the robot's file, that of the
+    mesh, that of the part.
+    """
     otherwise = _color_of_part(robot, part)
     if visual.mesh is not None:
         shown = meshes.get(visual.mesh, ())

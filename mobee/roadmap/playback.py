@@ -144,7 +144,12 @@ def _timed(places: Array, speeds: Array, accelerations: Array, dt: float) -> tup
 
 
 def _speeds(lengths: Array, tangent: Array, bend: Array, speeds: Array, accelerations: Array) -> Array:
-    """Return the largest speed at each point of the path (S,): half of each acceleration is used for bends, half for changes of speed."""
+    """Return the largest speed along the path, in path length per second, at each of its S points (S,); 0 at both ends.
+
+    `lengths`: (S - 1,) between points. `tangent`, `bend`: first and second derivative (S, n) of the motors' positions by the path length.
+    `speeds`, `accelerations`: limits (n,) of the motors. Half of a motor's acceleration is kept for the bends of the path, the other half
+    for changes of speed along it.
+    """
     half = 0.5 * accelerations
     with np.errstate(divide="ignore"):
         limit = np.minimum((speeds / np.abs(tangent)).min(axis=1) ** 2, (half / np.abs(bend)).min(axis=1))

@@ -139,7 +139,7 @@ class Roadmap:
         return q
 
     def _from(self, q_from: ArrayLike) -> Array:
-        """Return the distance of every vertex from a posture (n,) rad, (V,), see `entry`."""
+        """Return the distance (V,) of every vertex from the posture `q_from` (n,) rad: a Euclidean distance without a unit, see `entry`."""
         start = self._posture(q_from)
         free = chosen(self.model.robot, self.motors)
         low, high = self.model.robot.limits[free].T
@@ -147,7 +147,11 @@ class Roadmap:
         return apart
 
     def _to(self, y_goal: ArrayLike) -> Array:
-        """Return the distance of every vertex from task coordinates (m,), (V,) spacings; infinite beyond MAX_GOAL_DISTANCE."""
+        """Return the distance of every vertex from the task coordinates y_goal (m,); (V,), infinite where it is above MAX_GOAL_DISTANCE.
+
+        Each coordinate is divided by its spacing, the distance of neighbouring vertices along it: the distances are in spacings. Raises
+        InvalidValue if y_goal has another shape or is not finite, or if no vertex is within MAX_GOAL_DISTANCE (1.5 spacings).
+        """
         goal, m = np.atleast_1d(real_array("y_goal", y_goal)), len(self.spacing)
         if goal.shape != (m,) or not np.isfinite(goal).all():
             raise InvalidValue(f"y_goal has shape {goal.shape}; it must be ({m},) finite numbers: {', '.join(self.names)}.")

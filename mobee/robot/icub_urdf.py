@@ -80,7 +80,7 @@ def _remove_subtree(root: ET.Element, joint_name: str) -> None:
 
 
 def _empty_frames(root: ET.Element) -> list[str]:
-    """Return fixed joints whose child is a leaf of the tree without inertia, except the palms' frames."""
+    """Return the names of the fixed joints whose child link has neither inertia nor joints; a joint to a palm's frame is not among them."""
     parents = {_end(joint, "parent") for joint in root.iter("joint")}
     heavy = {link.get("name") for link in root.iter("link") if link.find("inertial") is not None}
     return [

@@ -104,7 +104,10 @@ def join_placed(placed: Sequence[Placed], name: str) -> Robot:
 
 
 def _shifted(one: Placed, joints: int, motors: int, all_motors: int) -> Robot:
-    """Return a robot with its new names, indices and pose; `joints`, `motors`: of the robots before it; `all_motors`: of all robots."""
+    """Return the robot of `one` as it is in the joined robot: with prefixed names, new indices, and the pose of its root frame.
+
+    `joints`, `motors`: numbers of joints and of motors of the robots before it. `all_motors`: number of motors of all robots.
+    """
     robot, turn = one.robot, one.rotation
 
     def link(index: int) -> int:

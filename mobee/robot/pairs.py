@@ -48,7 +48,11 @@ def joined_links(joints: Sequence[Joint]) -> dict[LinkPair, str]:
 
 
 def _clusters(joints: Sequence[Joint]) -> list[list[int]]:
-    """Return the joints of each cluster; a joint joins the cluster of the first joint near it that carries it or is beside it."""
+    """Return the clusters of joints, each as a list of indices of joints.
+
+    A joint is compared with its parent joint, then with earlier joints on the same link. It joins the cluster of the first of these that is
+    nearer than CLUSTER (5 cm); if there is none, it starts a new cluster.
+    """
     points = np.array([joint.point for joint in joints]).reshape(-1, 3)
     beside: dict[int, list[int]] = {}  # link -> its joints
     home: list[int] = []  # joint -> its cluster

@@ -135,7 +135,12 @@ def neighbours(elements: Sequence[Element], bearing: Collection[int]) -> set[fro
 def _passed(
     elements: Sequence[Element], here: int, start: int, bearing: Collection[int], link: bool, joint: bool
 ) -> tuple[bool, bool] | None:
-    """Return whether the search down the tree has passed a link and a joint when it leaves an element; None if it ends before it."""
+    """Return the two flags of the search in `neighbours` after it has visited the element `here`; None if it ends before this element.
+
+    The flags state whether this branch of the search has passed a link whose parent is a joint, and a joint whose parent is a link; `link`
+    and `joint`: their values before the element. Only elements in `bearing`, which have a solid, count. `start`: the element whose
+    neighbours are searched. The conditions are those of `neighbours`.
+    """
     element, carrier = elements[here], elements[here].parent
     if carrier <= 0 or carrier == elements[start].parent:
         return link, joint

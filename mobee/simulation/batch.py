@@ -146,7 +146,10 @@ class PlantBatch:
 
 
 def _run_traced(plants: Sequence[OfflinePlant], ticks: int, threads: int) -> Array:
-    """Do what `PlantBatch.run` does, for plants some of which need Python in their ticks."""
+    """Return the result of `PlantBatch.run` for plants of which at least one cannot prepare its ticks for the core.
+
+    The result is (k, 2) m, the depths of the deepest contacts of solids and of fields in each plant. Raises BatchInterrupted like `run`.
+    """
     try:
         return np.array([_deepest(trace) for trace in run_together(plants, ticks, threads)])
     except BatchInterrupted as error:

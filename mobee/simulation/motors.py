@@ -333,14 +333,17 @@ class Motors:
 
 
 def _checked_seed(seed: int) -> int:
-    """Return the seed as the core reads it, 64 bits; raises InvalidValue."""
+    """Return the seed modulo 2^64, as the core reads it; raises InvalidValue unless it is a whole number of at least 0."""
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
         raise InvalidValue(f"seed {seed!r}: must be a whole number, 0 or more")
     return int(seed) % 2**64
 
 
 def _constants(robot: Robot, parameters: MotorParameters) -> Table:
-    """Return the constants of each motor, one row per motor."""
+    """Return a table of the constants of each motor for the core, one row per motor, with the columns of `CONSTANTS`.
+
+    Set are the limits of position, velocity, acceleration and torque, half of the backlash, and the friction; the other columns are 0.
+    """
     table: Table = np.zeros(len(robot.motor_table), dtype=core.CONSTANTS)
     table["low"], table["high"] = robot.limits.T
     for name in ("max_velocity", "max_acceleration", "max_torque"):

@@ -378,7 +378,10 @@ class OfflinePlant:
         return True
 
     def _ticks_of(self, most: int, traced: bool = False) -> Work[Array]:
-        """Run up to `most` ticks, until an action ends; return the record (ticks, 3 n + 2), which is empty unless `traced` or hashed."""
+        """Run up to `most` ticks, or until an action ends; return the record (ticks, 3 n + 2) as `conclude` does.
+
+        The record is empty unless `traced`, or unless the plant computes a digest of its encoder values.
+        """
         if self._callback is not None:
             most = min(most, self._period - self._runner.ticks % self._period)
         address = self._runner.prepare(most, traced or self._digest is not None, traced, self.reaching)
@@ -419,7 +422,10 @@ class OfflinePlant:
                     self._test(part)
 
     def _test(self, part: str) -> None:
-        """Start the part's settle test at the tick that has ended, as live, so that the next tick is the first one tested."""
+        """Start a new test whether the part has settled (stands still), at the time of the tick that has just ended, as in the live system.
+
+        The next tick is then the first tick of the action; `Settle.first_check` is the time [s] from the start to the first check.
+        """
         self._actions.begin(part, self.time - self.dt, self.controller.gains.settle.first_check)
 
     def _require_alone(self, part: str, doing: str) -> None:
@@ -431,7 +437,10 @@ class OfflinePlant:
         return self._actions.outcome(part, self._runner.q, self.time - self.dt, self._touched(part))
 
     def _touched(self, part: str) -> tuple[str, ...]:
-        """Return what `touched_by` returns for the part in the present pose, without computing self-contacts."""
+        """Return the sorted names of the free world objects that touch the part in the present pose; see `touched_by`.
+
+        Self-contacts are not computed.
+        """
         snapshot = self.model.world.snapshot
         if not snapshot.names:
             return ()

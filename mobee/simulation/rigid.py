@@ -121,7 +121,12 @@ def _moved_joint(joint: Joint, brought: Array, link: Ints) -> Joint:
 
 
 def _shapes(robot: Robot, link: Ints, solids: bool) -> tuple[Ints, Ints, Ints]:
-    """Return the remaining shapes, and the pairs of them that can move relative to each other, by their new numbers."""
+    """Return the indices of the shapes that the reduced robot keeps, and the pairs of solids and of fields (p, 2) in it.
+
+    `link`: for each link of the robot the index of the link that replaces it. The pairs contain new numbers, indices in the kept shapes.
+    Pairs on one link are left out. Kept are shapes on all links but the base, of the role "field" only unless `solids`, and all shapes in
+    the pairs.
+    """
     of_shape = np.array([link[shape.link] for shape in robot.shapes], dtype=np.intp)
     solid, fields = (pairs[of_shape[pairs[:, 0]] != of_shape[pairs[:, 1]]] for pairs in (robot.solid_pairs, robot.field_pairs))
     needed = of_shape != 0

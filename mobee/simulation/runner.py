@@ -209,7 +209,11 @@ class Runner:
         return near.enter(snapshot, hands)
 
     def _new_neighbours(self, whole: bool, reaching: Hands, solids: bool) -> tuple[Neighbours, Hands]:
-        """Make the contact search of the whole robot, or of a reduced one with separate hand links; returns it and the hands."""
+        """Return a new contact search, and the hands whose contacts with targets it ignores, with the link indices of its robot.
+
+        `whole`: search the whole robot; else a reduced one, in which links that cannot move relative to each other are merged, but the
+        links of the hands are kept. `reaching`: the hands that reach for a target. `solids`: whether contacts of solids are needed too.
+        """
         robot = stiff = self._controller.robot
         if not whole:
             apart = [link for hand in reaching for link in (hand.link, hand.fields)]
@@ -219,7 +223,12 @@ class Runner:
         return Neighbours(engine_of(stiff), SKIN, self._cut), reaching
 
     def _pose_forces(self, q: Array, reaching: tuple[str, ...]) -> Array:
-        """Set the forces of Python terms and gravity compensation at q (n,), and return the forces of clients."""
+        """Compute the forces that depend on the pose q (n,) rad, and return the force of the client (n,) rad/s^2.
+
+        The client is the caller of `Controller.force` and `push`. The forces of the user's own terms are written to `_forces`. In torque
+        mode the torque [N m] against gravity is set too. `reaching`: names of the markers that reach for a target; targets do not repel
+        their hands.
+        """
         controller, motors = self._controller, self._motors
         if controller.terms and np.isfinite(q).all():
             self._forces[len(term_names()) :] = list(controller.own_forces(q, self._dt, reaching=reaching).values())

@@ -133,9 +133,11 @@ class SlidingObject:
                 self._plant.model.world.move(self.name, position=after)
 
     def _pushed(self, q: bytes, place: Array, found: Array | None) -> Array | None:
-        """Return the place (3,) where no solid of the robot is deeper in it than the tolerance; None if it falls.
+        """Return the position (3,) m, root frame, to which the robot's solids push the object; None if the object falls.
 
-        `place`: where it is, which is changed; `found`: the deepest contact there, see `_deepest`.
+        It is pushed along the horizontal part of the contact normal until no solid is deeper in it than the tolerance. It falls if a
+        contact is too high or its normal nearly vertical, if it leaves its area, or if MOST_PUSHES pushes are not enough. `q`: motor
+        positions as bytes. `place`: its position, which is changed. `found`: its deepest contact there, see `_deepest`.
         """
         highest = self._first.size[0] / self.friction
         for _ in range(MOST_PUSHES):

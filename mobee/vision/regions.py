@@ -28,7 +28,11 @@ def label(mask: Mask, diagonal: bool) -> Labels:
 
 
 def _connected(starts: Labels, ends: Labels, below: int, gap: int) -> Labels:
-    """Return the region of each run of pixels, from 0; `below`: pixels in a row; `gap`: 1 if corners connect, else 0."""
+    """Return the number of the connected region of each run (sequence of pixels of the mask in one row), from 0.
+
+    `starts`, `ends`: for each run the index of its first pixel and of the pixel after its last, in the mask row by row. `below`: pixels in
+    a row. `gap`: 1 if pixels that share only a corner are connected, else 0.
+    """
     first = np.searchsorted(ends - below, starts - gap, side="right")  # the first run in the next row that is connected with each run
     count = np.searchsorted(starts - below, ends + gap, side="left") - first
     upper = np.repeat(np.arange(len(starts)), count)

@@ -112,7 +112,10 @@ def _part_of(robot: Robot, link: int) -> str:
 
 
 def _squares(cells: list[tuple[int, int]], side: float, first: float) -> Piece:
-    """Return squares in the plane z = 0, visible from -z."""
+    """Return squares in the plane z = 0, visible from -z: one for each cell (row, column).
+
+    `side`: length of a side [m]. `first`: coordinate x and y [m] of the corner of cell (0, 0); x grows with the column, y with the row.
+    """
     points: list[tuple[float, float, float]] = []
     triangles: list[tuple[int, int, int]] = []
     for row, column in cells:
@@ -236,7 +239,10 @@ def _samples(pattern: Array, margin: int, blur: float) -> tuple[Array, Array]:
 
 
 def _through(plane: Array, points: Array) -> tuple[Array, Array]:
-    """Return points (K, 2) of a plane in the plane at distance 1 (K, 2), and the derivative (K, 2, 8) by the numbers of `plane` (8,)."""
+    """Map points (K, 2) of the tag's plane to the plane at distance 1 from the camera (K, 2); also return derivatives (K, 2, 8).
+
+    `plane`: (8,), the homography between these planes; the derivatives are by its numbers. The square [-1, 1] x [-1, 1] is the tag.
+    """
     x, y = points.T
     below = plane[6] * x + plane[7] * y + 1.0
     flat = np.stack([(plane[0] * x + plane[1] * y + plane[2]) / below, (plane[3] * x + plane[4] * y + plane[5]) / below], axis=1)
@@ -252,7 +258,7 @@ def _pixels(lens: Lens, plane: Array, points: Array) -> Array:
 
 
 def _plane_through(corners: Array) -> Array:
-    """Return the eight numbers of the perspective that takes the square [-1, 1] x [-1, 1] to corners (4, 2)."""
+    """Return the homography (8,) that maps the square [-1, 1] x [-1, 1] to corners (4, 2): the rows of its matrix, without the last 1."""
     rows, values = [], []
     for (x, y), (u, v) in zip(_SQUARE, corners, strict=True):
         rows += [[x, y, 1, 0, 0, 0, -u * x, -u * y], [0, 0, 0, x, y, 1, -v * x, -v * y]]

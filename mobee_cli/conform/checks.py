@@ -299,7 +299,7 @@ def _accepted(call: Callable[[], object]) -> bool:
 
 
 def _toward_middle(player: Player, part: str) -> Array:
-    """Return the first motor's direction to the middle of its range, and 0 for the others, (n,)."""
+    """Return the direction in which the first motor of a part moves toward the middle of its range: 1 or -1; 0 for the others, (n,)."""
     middle = player.robot.limits[player.robot.part(part).slice].mean(axis=1)
     direction: Array = np.where(np.arange(len(middle)) == 0, np.where(player.q(part) < middle, 1.0, -1.0), 0.0)
     return direction

@@ -98,7 +98,11 @@ def setup_of(arguments: argparse.Namespace, robot: str) -> Setup:
 
 
 def _eyes(cameras: Sized, world: str, robot: str) -> tuple[str, ...]:
-    """Return the services of cameras: the renderer, and the locator if there are two and something to locate; raises MobeeError."""
+    """Return the names of the services that the cameras need, none without cameras.
+
+    They are "renderer", and also "vision", which locates things, if two or more cameras and a thing to locate exist. Raises MobeeError if
+    the world cannot be read.
+    """
     things = things_in(world_around(world, robot))
     return ("renderer",) * bool(cameras) + ("vision",) * (len(cameras) >= STEREO and bool(things))
 
@@ -127,7 +131,10 @@ def _parts(texts: list[str]) -> dict[str, tuple[str, ...]]:
 
 
 def _described(derived: Derived, remarks: Sequence[str], cameras: Sequence[str]) -> Iterator[str]:
-    """Yield at most ten lines of at most WIDTH columns that describe the derived robot."""
+    """Yield lines that describe a derived robot to the user: a robot whose arms, limits and fields were derived from its file.
+
+    There are at most nine lines, and one more for each arm, each of at most WIDTH columns.
+    """
     robot = derived.robot
     yield _cut(f"{robot.name}: {len(robot.motors)} motors in {len(robot.parts)} parts, {len(robot.shapes)} shapes")
     for remark in remarks[:2]:

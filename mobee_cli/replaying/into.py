@@ -126,7 +126,10 @@ class _Replay:
     # The start
 
     def _begin(self, tick: TickOf) -> None:
-        """Start the service in tick 0, which is repeated until it is ready, and make the calls of the start."""
+        """Start the service, publish tick 0 until the service has answered it, and repeat the calls that it had received in tick 0.
+
+        Raises MobeeError if the recording does not begin at tick 0, or was not made in lockstep.
+        """
         if tick.k != 0 or not tick.of("Tick"):
             raise MobeeError(
                 "the recording does not begin at tick 0 of a run: its first file is needed, and a recorder that was there first"
@@ -255,7 +258,10 @@ class _Replay:
             self._answered = max(self._answered, k)
 
     def _compare(self, tick: TickOf | None) -> bool:
-        """Compare the service's messages of a tick whose last message has arrived; return whether they differ."""
+        """Compare the recorded messages of the service at a tick with those that it sent in the replay; return whether they differ.
+
+        The tick must be complete; None: nothing is compared, and the result is False.
+        """
         if tick is None:
             return False
         then = [item for item in self._own(tick) if item.type in self._role.says]

@@ -154,7 +154,7 @@ def as_json(trm: Roadmap, path: Path) -> dict[str, Any]:
 
 
 def _as_parts(robot: Robot, motors: tuple[str, ...]) -> list[str]:
-    """Return the names of whole parts, and of the other motors."""
+    """Return the names of the parts whose motors are all in `motors`, then the names of the motors that are left."""
     found, left = [], list(motors)
     for name, part in robot.parts.items():
         if set(part.motors) <= set(left):

@@ -59,7 +59,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _short(names: tuple[str, ...], room: int) -> str:
-    """Return the names in at most `room` characters."""
+    """Return the names as a text of at most `room` characters. If not all fit, "..." replaces the last ones."""
     whole, kept = ", ".join(names), list(names)
     while len(whole) > room and len(kept) > 1:
         kept.pop()

@@ -33,7 +33,10 @@ TASK = ("goal", "goal_weight")  # settings of other types in a file, see Config
 
 
 def _of_file(hint: Any) -> Any:
-    """Return the type of a setting in a scenario file: text if the library takes a name or an object; bounds in msgspec's form."""
+    """Return the type of a setting in a scenario file, made from the type hint of the setting in the library.
+
+    A setting for which the library takes a name or an object is text (str). The bounds of a `Range` are translated to those of msgspec.
+    """
     if str in get_args(hint):
         return str
     kind, *valid = get_args(hint) if hasattr(hint, "__metadata__") else (hint,)

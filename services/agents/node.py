@@ -110,7 +110,10 @@ class AgentNode:
         self._work.run(resumed, lambda: 0 < wanted <= agent.transitions, self._step)
 
     def _explore(self, request: Explore, key: str) -> Done:
-        """Choose the next actions by another explorer, and record that."""
+        """Change the agent's explorer, which chooses the next actions; the agent's store records the change, and an event reports it.
+
+        Raises CallRefused if there is no such explorer, or if the agent has a goal that the explorer ignores.
+        """
         valid = (*EXPLORERS, self._agent.settings["explorer"])
         if request.explorer not in valid:  # a call imports no code
             raise CallRefused("explorer", f"no explorer {request.explorer!r}; valid: {', '.join(valid)}")

@@ -30,10 +30,10 @@ PATIENCE = 10.0  # s of the robot's clock after which the simulator is asked aga
 class ObjectPlant(PerceivingPlant):
     """A live plant that perceives one object: an action ends only when vision has seen this object at rest in its area.
 
-    Pictures that were taken before the end of the motion do not count. If the object is not seen in the area, the part moves to the posture
-    `aside` of the settings, and the action ends there. If it is still not seen in its area, it has fallen or has left the area. The
-    simulator or a person puts it back, and the action ends when the object is seen again. So an outcome always contains what was seen after
-    the action.
+    Pictures that were taken before the end of the motion do not count. If the object is not seen in the area within 2 s (LOOK), the part
+    moves to the posture `aside` of the settings, because it may hide the object. If the object is seen then, the action ends. Otherwise it
+    has fallen or has left the area: the simulator or a person puts it back, and the action ends when it is seen in the area. So an outcome
+    always contains the position of the object after the action.
 
     Args:
         service: the service of the agent.

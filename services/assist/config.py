@@ -39,8 +39,8 @@ class Config(BehaviourConfig, frozen=True, kw_only=True):
     def check_robot(self, robot: Robot) -> None:
         """Raise MobeeError if the settings do not fit the robot.
 
-        This is so if the part does not carry the arm, if the run `learned` cannot be read, or if the name of a part cannot be used in keys
-        of the bus.
+        This is so if no motor of `part` moves the base of the part `arm`, if the run of learning in the folder `learned` cannot be read, or
+        if the name of a part cannot be used in keys of the bus.
         """
         super().check_robot(robot)
         self.assist(robot)

@@ -125,8 +125,8 @@ class Latest(Generic[_M]):
 def part_of(cls: type[Message], name: str) -> str | None:
     """Return the part whose number of motors the vectors in messages of the type `cls` must have; None: the lengths are not checked.
 
-    `name`: value of the variable in the messages' key. If the variable is the part, the result is `name`, except for * (any part). In all
-    other cases the result is None.
+    `name`: the text that stands for the variable in the key of the messages. If this variable is the part, as in "{part}/motion", the
+    result is `name`. If `name` is "*" (any part), or the key has another variable or none, the result is None.
     """
     return name if cls.stream.variable == "part" and name != "*" else None
 

@@ -52,7 +52,8 @@ class BusFollower(BusPlant):
 
         A part rests if its commanded speed and acceleration are at most those of `settle`, and the mean of its encoder values changes by
         less than DRIFT (0.001 rad) from one window of WINDOW (0.3 s) to the next. The commanded speed alone is not enough: a part that is
-        slower than the published settle speed (1 deg/s) can still be half a degree from its goal. Therefore the encoders are tested too.
+        slower than the threshold of `Gains.published_2014` (1 deg/s) can still be half a degree from its goal. Therefore the encoders are
+        tested too.
         """
 
         def moving() -> list[str]:

@@ -297,7 +297,11 @@ class BusPlant:
         self._service.spin(time.monotonic() + seconds, may_continue)
 
     def _answer(self) -> None:
-        """Answer the tick that waits for this service; tick 0, which is repeated, only after all goals were taken."""
+        """Report to robot_sim that this service has finished the tick for which robot_sim waits (lockstep).
+
+        Tick 0 is answered only if this service owns the goals of all parts that it uses, or these parts are in hold. robot_sim repeats tick
+        0 until it is answered.
+        """
         if self._to_answer is None:
             return
         if self._to_answer > 0 or all(self._owns(part) or self._is_held(part) for part in self._wanted):
@@ -309,7 +313,11 @@ class BusPlant:
         self._to_answer = turn.k
 
     def _send(self, part: str, verb: str, request: type[Request], action_id: str, **fields: Any) -> Sent:
-        """Start an action."""
+        """Call the controller to start an action of a part, and return the sent action.
+
+        `verb`: last word of the call's key. `fields`: data of the request. Raises InvalidValue if the controller refuses the target because
+        of the limits or the reach, ActionInterrupted if the call fails for another reason.
+        """
         key, controllers = keys.goal(part, verb), self._controllers()
         try:
             reply = self._service.call(key, request, Started, tries=TRIES, epoch=self._epochs[part], action_id=action_id, **fields)

@@ -127,9 +127,9 @@ class StopRecord:
     def stop(self, source: str, reason: str) -> bool:
         """Record a new stop; return False if the file does not exist, because then no robot_sim watches it.
 
-        `source`: name of the process that stops the robot. `reason`: text for the user. If the file records a stop already, this stop is
-        replaced only if the launcher has set it and `source` is another process. True: the file exists, and records the new stop or the
-        earlier one. Raises OSError if the file cannot be written.
+        `source`: name of the process that stops the robot. `reason`: text for the user. If the file records an earlier stop, the new
+        one replaces it only if the launcher has set the earlier one and `source` is another process. True: the file exists and records the
+        new stop or the earlier one. Raises OSError if the file cannot be written.
         """
         if not self._path.exists():
             return False
@@ -212,9 +212,10 @@ _CONFIRMED = b"mobee stopped"  # the answer; it is no stop, so that two receiver
 
 
 def datagram_address(endpoint: str) -> str:
-    """Return the UDP address HOST:PORT for stops of the robot whose router listens at an endpoint; it has the number of the TCP port.
+    """Return the UDP address HOST:PORT to which a stop of a robot is sent as a datagram.
 
-    Empty if there is none: the endpoint is secured, because datagrams have no keys, or only processes of its machine can use it.
+    `endpoint`: address at which the robot's router listens. The UDP port has the same number as its TCP port. The result is empty if the
+    endpoint is secured (a datagram does not prove who sent it), or if only processes of the same machine can use the endpoint.
     """
     return re.split("[?#]", endpoint.removeprefix("tcp/"))[0] if endpoint.startswith("tcp/") else ""
 
@@ -261,7 +262,7 @@ class StopDatagrams:
         return stops
 
     def confirm(self) -> None:
-        """Answer the senders of all stops that were taken since the last call: robot_sim obeys them."""
+        """Send the answer that robot_sim obeys the stop to the senders of all stops that `take` has returned since the last call."""
         for sender in self._senders:
             with suppress(OSError):  # the sender repeats the stop until it has an answer
                 self._socket.sendto(_CONFIRMED, sender)

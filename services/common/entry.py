@@ -58,7 +58,7 @@ def explained(prog: str) -> Iterator[None]:
 
 
 class _LogFile(logging.FileHandler):
-    """A log file."""
+    """The handler of a service's log file; if the disk is full, it drops lines."""
 
     def handleError(self, record: logging.LogRecord) -> None:
         """Drop a line if the disk is full, without the traceback of `logging`, which would cover the status screen."""

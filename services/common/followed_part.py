@@ -69,9 +69,9 @@ class FollowedPart:
     def take(self) -> None:
         """Ask the controller for the goal of the part (the right to set its attractor), at most once per RETRY_PERIOD (0.5 s).
 
-        The behaviours are the services `assist` and `gaze`. The call is not made while the goal belongs to any other service. If it belongs
-        to the other behaviour, the controller gives it to this service only if this service has the higher rank
-        (services/controller/precedence.py). `is_owned` becomes True when this service has got the goal.
+        `is_owned` becomes True when this service has got the goal. If the goal belongs to a service that is not a behaviour (`assist` or
+        `gaze`), no call is made. If it belongs to the other behaviour, the controller gives it to this service only if this service has
+        the higher rank (services/controller/precedence.py).
         """
         now, motion = time.monotonic(), self._motions.get(self._part)
         if motion is None or motion.owner not in ("", self._service.who, *BEHAVIOURS):

@@ -42,10 +42,11 @@ def hand_of(robot: Robot, part: str) -> str:
 
 
 def end_markers(robot: Robot) -> tuple[str, ...]:
-    """Return the names of the markers on links without child links, without the markers that no motor moves.
+    """Return the names of the markers that a motor moves and that lie on a link without child links, such as a hand.
 
-    If none is left, return all markers that a motor moves. The names are sorted by the number of motors that move the marker, the largest
-    number first (a hand comes before a wheel); equal ones are in the order of the robot's file.
+    A marker is a named point on a link. If there is no such marker, return all markers that a motor moves. The names are sorted by the
+    number of motors that move the marker, the largest number first (a hand comes before a wheel); equal ones are in the order of the
+    robot's file.
     """
     inner = {joint.parent for joint in robot.joints}
     links = frozenset[int]().union(*links_moved(robot).values())
@@ -69,9 +70,10 @@ def part_of(robot: Robot, marker: str) -> str:
 def hand_for(robot: Robot, place: Array | None) -> str:
     """Return the name of the marker with which to reach for a place: the candidate that is nearest to it in the robot's home posture.
 
-    The candidates are the two palms, the right one first. For a robot without both palms, they are those of its `end_markers` that the
-    largest number of motors moves. `place`: (3,) m, root frame; None: not known. If several are equally near (within 1 mm), or the place is
-    not known, the first of these candidates is returned. Raises InvalidValue if no motor of the robot moves a marker.
+    The candidates are the right and the left palm, in this order. If the robot does not have both palms, the candidates come from its
+    `end_markers` (markers on links without child links), in their order: those that the largest number of motors moves. `place`:
+    (3,) m, root frame; None: not known. If the place is not known, the first candidate is returned; if several candidates are equally near
+    (within 1 mm), the first of these. Raises InvalidValue if no motor of the robot moves a marker.
     """
     ends = end_markers(robot)
     if not ends:

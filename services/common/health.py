@@ -41,7 +41,11 @@ class Beats:
         return None if self._last is None else now - self._last
 
     def end_window(self, now: float) -> None:
-        """End the present window at the time `now` [s]: set its `rate` [Hz] and longest `gap` [s], and begin a new one."""
+        """End the present window (the period in which events are counted) at the time `now` [s], and begin a new one.
+
+        Sets `rate`, the events per second in the window [Hz], and `gap`, the longest time without an event that ended in it, or still lasts
+        [s]. Both stay None before the first event.
+        """
         if self._last is not None:
             self.rate, self.gap = self._count / (now - self._begun), max(self._gap, now - self._last)
         self._begun, self._count, self._gap = now, 0, 0.0

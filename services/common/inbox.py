@@ -178,7 +178,10 @@ class Inbox:
                 return
 
     def _take_waiting(self, seconds: float) -> Handler | None:
-        """Return the next handler; None if none comes within `seconds`, or sooner if the thread was woken for one that has run."""
+        """Return the next handler of the queue; None if there is none within `seconds`.
+
+        The method can also return None sooner, if the thread was woken for a handler that has run already.
+        """
         if seconds > 0 and not self._queue:
             self._signal.acquire(timeout=seconds)
         return self._queue.popleft() if self._queue else None

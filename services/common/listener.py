@@ -99,7 +99,8 @@ class Listener:
     def _newest(self, handle: Callable[[zenoh.Sample], None]) -> Callable[[zenoh.Sample], None]:
         """Return a callback that handles only the newest sample (received message) of a stream.
 
-        In lockstep it handles every sample, since a slot for one would reorder two streams.
+        A sample that is not handled yet is replaced by a newer one. In lockstep every sample is handled, in the order of arrival: with
+        replacements, samples of two streams could be handled in another order.
         """
         slot = Newest(self.inbox, handle)
 
@@ -112,7 +113,11 @@ class Listener:
         return offer
 
     def _subscribe(self, key: str, offer: Callable[[zenoh.Sample], None]) -> None:
-        """Subscribe to a key; `direct`: without a thread per subscriber, which takes time and could reorder two streams in lockstep."""
+        """Subscribe to a key of the bus and call `offer` with each sample (received message).
+
+        With the service's setting `direct`, Zenoh's own thread calls it. Without it, each subscription has a thread of Python: this costs
+        time, and could change the order of two streams in lockstep.
+        """
         self._kept.append(self.bus.session.declare_subscriber(key, Callback(stay_known(offer), indirect=False) if self._direct else offer))
 
     def on_clock(self, handler: Callable[[Clock], None]) -> None:

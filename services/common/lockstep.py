@@ -72,7 +72,7 @@ class Barrier:
         referee: str = "controller",
         patience: float = 2.0,
     ) -> None:
-        """Subscribe to the answers.
+        """Subscribe to the answers of the participants to the ticks (`StepDone` messages).
 
         `participants`: names of the services that are expected. `report`: called with (participant, reason) when the run is no longer
         repeatable. `referee`: the service whose answers list busy participants. `patience`: s of real time for one tick; a participant that

@@ -74,7 +74,10 @@ class Refusal:
 
 @dataclass
 class RefusalLog:
-    """Collects what the secured router in this process refuses, from the log of Zenoh."""
+    """Reads the log of Zenoh and counts the messages and connections that the secured router in this process refuses.
+
+    `open` makes the object, and `take` returns the counts.
+    """
 
     _reader: int
     _rest: bytes = b""
@@ -158,9 +161,10 @@ class RefusalLog:
         return None
 
     def _is_preparation(self, line: str, action: str, key: str) -> bool:
-        """Return whether Zenoh computes what a session may do with a key, before the session has done anything.
+        """Return whether a "denied" line of Zenoh's log is no refusal, since Zenoh only computes the permissions for a key in advance.
 
-        A thread reports each kind of message once then, directly after it has named the key.
+        A thread of Zenoh first logs the key of this computation, then each kind of denied message once. `action`: the kind of message in
+        this line. A line of another key, or of an action that was already logged, ends the preparation of this thread.
         """
         if _CACHED in line or not (thread := _THREAD.search(line)):
             return False

@@ -161,8 +161,9 @@ class Service(Listener):
     def on_request(self, key: str, cls: type[_Q], handler: Callable[[_Q, str], Reply], part_of_key: bool = False) -> None:
         """Answer calls of `key` with the reply that handler(request, key) returns.
 
-        `cls`: type of the requests. The handler may raise CallRefused. `part_of_key`: True: the key begins with the name of a part; then
-        requests are refused whose vectors of motor values do not have as many entries as this part has motors.
+        `cls`: type of the requests. The handler may raise CallRefused: the caller then receives its code and text. `part_of_key`: True: the
+        key begins with the name of a part. A request is then refused if a vector of it for the motors of a part has another number of
+        entries than this part has motors.
         """
 
         def enqueue(query: zenoh.Query) -> None:
@@ -313,7 +314,11 @@ class Service(Listener):
                 self._ask_router()
 
     def _ask_router(self) -> None:
-        """Ask which router answers, once a second until one does for every token: a new system may be starting."""
+        """Ask the launcher and the router for their status, to find out whose tokens of a router (presence signals) are on the bus.
+
+        The call repeats itself once a second as long as there is a token that is neither of this service's router nor known to belong to no
+        process: a new system may be starting there. `_check_system` handles the answers.
+        """
         others = self.alive["router"] - self._strays - {self._router}
         self._is_asking = bool(others)
         if not others:
@@ -323,7 +328,11 @@ class Service(Listener):
         self.inbox.at(time.monotonic() + 1.0, self._ask_router)
 
     def _check_system(self, who: str, others: set[str], answer: Stat | rpc.CallFailed) -> None:
-        """End if a launcher or router answers that is not the one of this service's system; `others`: tokens that were there before."""
+        """Call `on_new_system`, which ends a service, if a launcher or router of another system answers a `stat` call.
+
+        `who`: "launcher" or "router". `others`: presence tokens of other routers that were on the bus at the call. If the router of this
+        service's system answers, these tokens belong to no process and are ignored from now on.
+        """
         if not isinstance(answer, Stat) or self.who == who:
             return
         if answer.instance != self._router:
@@ -362,7 +371,10 @@ class Service(Listener):
         )
 
     def _answer_pulse(self, query: zenoh.Query) -> None:
-        """Answer on a thread of Zenoh, so that the launcher sees whether the inbox advances while calls wait in it."""
+        """Answer the launcher's query for a pulse: how many messages the inbox has handled, and how many wait.
+
+        It runs on a thread of Zenoh, so it answers also if the main thread is busy. So the launcher sees whether the inbox advances.
+        """
         pulse = Pulse(v=VERSION, handled=self.inbox.handled, waiting=self.inbox.waiting())
         with query:
             query.reply(query.key_expr, encode(pulse), encoding=encoding_of(Pulse))
@@ -383,7 +395,7 @@ class Service(Listener):
 
 
 def _measured(value: float) -> int | float | None:
-    """Return a number of `describe` for the bus: a count stays a whole number; None if it was not measured."""
+    """Return a status number of a service's `describe` for a message: int or float; None if it was not measured or is not finite."""
     if value == NOT_MEASURED or not math.isfinite(value):
         return None
     return int(value) if isinstance(value, Integral) else float(value)
@@ -401,7 +413,10 @@ def return_free_memory() -> None:
 
 @cache
 def _malloc_trim() -> Callable[[int], int] | None:
-    """Return the function of glibc, None with another C library; each `CDLL` makes classes that only a full collection frees."""
+    """Return glibc's function malloc_trim, which returns unused memory to the system; None with another C library.
+
+    The result is cached, since each `ctypes.CDLL` creates classes whose memory only a full garbage collection frees.
+    """
     return getattr(ctypes.CDLL(None), "malloc_trim", None)
 
 

@@ -70,10 +70,10 @@ def end_unreceived(endpoint: str, lease: float) -> None:
     """Let Linux end a connection of this process at `endpoint` if sent data does not arrive at the other side for `lease` [s].
 
     This sets the socket option TCP_USER_TIMEOUT; on other systems nothing is changed. Zenoh itself ends a silent connection after the
-    lease, but with TLS it first waits until the data in the socket is sent. If the network was interrupted, this can take until long after
-    it works again. For an endpoint of this host nothing is changed: the network cannot interrupt such a connection, and the other process
-    may be paused on a busy machine for longer than the lease. A connection that a listener accepts gets the option of the listener. A
-    client must call this again for each new connection.
+    lease, but with TLS it first waits until the data in the socket is sent. After an interruption of the network, this wait can last long
+    after the network works again. For an endpoint of this host nothing is changed: the network cannot interrupt such a connection, and the
+    other process may be paused on a busy machine for longer than the lease. A router calls this once, because the connections that it
+    accepts inherit the option of its listening socket. A client must call this again for each new connection.
     """
     if not is_local(endpoint) and hasattr(socket, "TCP_USER_TIMEOUT"):
         _set_option(sockets_at(endpoint), socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, round(1e3 * lease))
@@ -84,7 +84,8 @@ def receive_together(sockets: Iterable[int], count: int) -> None:
 
     `sockets`: file descriptors of the connections, as `sockets_at` returns them. `count` = 1: the process is woken for any data, and at
     once if data already waits. A caller that sets a larger `count` must call this again with `count` = 1 several times per lease, so that
-    waiting data is received: a connection from which nothing is received for a whole lease counts as dead.
+    waiting data is received. The lease is a time set in Zenoh: a connection from which nothing is received for a whole lease counts as
+    dead.
     """
     if sys.platform == "linux":
         _set_option(sockets, socket.SOL_SOCKET, socket.SO_RCVLOWAT, count)

@@ -94,8 +94,8 @@ class Action:
         Args:
             k: tick.
             t: time of the tick, s.
-            speeds: commanded speeds of the part's motors, (n_part,) rad/s. For a motor that slides, give the speed [m/s] divided by its
-                length [m] in `mobee.robot.motor_units.fine_units`: this length counts as 1 rad.
+            speeds: commanded speeds of the part's motors, (n_part,) rad/s. For a motor that slides, give the speed [m/s] divided by the
+                distance [m] that counts as 1 rad for this motor, as `mobee.robot.motor_units.fine_units` gives it.
             accelerations: commanded accelerations, (n_part,) rad/s^2, divided likewise for motors that slide.
             continues: called when the motion has settled; if it returns True, for example because a marker still comes nearer to its
                 target, the status stays "moving".

@@ -35,7 +35,7 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
         """Raise MobeeError if these settings do not fit the robot.
 
         They do not fit if `posture` names an unknown part, has the wrong number of values, or leaves a motor's range; if one of the
-        user-defined `terms` cannot be loaded; or if a part's name cannot be used on the bus.
+        `terms` (user-defined forces of the control law) cannot be loaded; or if a part's name cannot be used on the bus.
         """
         super().check_robot(robot)
         if self.terms:

@@ -105,10 +105,10 @@ class Drives:
         return self._stop is not None
 
     def can_arm(self, state: PartStatus) -> bool:
-        """Return whether the drive of a part may be taken and armed now.
+        """Return whether this controller may now take and arm the drive of a part, the right to command the part's motors.
 
         This is so if there is no emergency stop, and the part's safety gate in robot_sim is "idle", "hold" or "armed". `state`: status of
-        the part, with the state of its gate. In "hold" the part stands still, in "armed" it follows commands.
+        the part, with the state of its gate. In "hold" the part stands still, in "armed" it follows the commands of the drive's owner.
         """
         return self._stop is None and state.gate in ("idle", "hold", "armed")
 

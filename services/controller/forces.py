@@ -70,7 +70,7 @@ class ModelForces:
 
     @property
     def contacts(self) -> Sequence[ContactItem]:
-        """All contacts in the stored message; empty if the model does not publish them."""
+        """All contacts of the robot, with itself and with objects, in `message`; empty if there is no message or it has no contacts."""
         return self.message.contacts or () if self.message is not None else ()
 
     def _refusal(self, message: ForcesMessage) -> str:
@@ -116,9 +116,10 @@ class PublishedContacts:
         """Return the published contacts for one pose q (1, n) rad, and the projection of field contacts to the motors, (1, n) m^2/rad.
 
         A field is a volume around a link, larger than the link; its contacts cause repulsive forces. The projection is the sum of
-        J^T (factor * depth * normal) over these contacts; the factors (1 if `robot.least_lever` is 0) are those of
-        `mobee.model.kinematics.push_factors`. `snapshot` (the world) and `reaching` (the hands that reach) are not used, because the model
-        service has already used its own when it computed the contacts.
+        J^T (factor * depth * normal) over these contacts and their two links, with the opposite normal for the second link. J (3, n) is the
+        Jacobian of the contact point on the link. The factors scale the forces (`mobee.model.kinematics.push_factors`); they are 1 if
+        `robot.least_lever` is 0. `snapshot` (the world) and `reaching` (the hands that reach) are not used, because the model service has
+        already used its own when it computed the contacts.
         """
         projection, numbers, reals = np.zeros_like(q), list[tuple[int, ...]](), list[list[float]]()
         for at, contact in enumerate(self._contacts):

@@ -75,7 +75,10 @@ class RobotLaw:
         return ticks
 
     def step(self, tick: Tick, ticks: int) -> Array:
-        """Advance the control law over `ticks` ticks; return the reference (n,): rad, rad/s or N m, by the modality in the settings."""
+        """Advance the control law by `ticks` steps; return the reference (n,): rad, rad/s or N m, by the modality in the settings.
+
+        `tick`: the newest `Tick` message, which contains the duration of one step. `ticks`: more than 1 if ticks were missed.
+        """
         for _ in range(ticks):
             self._state_before = self._law.state.copy()
             command = self._step(tick)
@@ -117,9 +120,10 @@ class RobotLaw:
     # One part
 
     def rest(self, part: str) -> None:
-        """Set a part that does not follow the control law to rest: commanded velocity 0, attractor at the measured position.
+        """Put the part at rest in the control law's state: commanded velocity 0, attractor at the measured position.
 
-        The attractor is the posture to which the springs of the control law pull the part.
+        Call this while the motors of the part do not follow the law's commands, and when they begin to follow them again. The attractor is
+        the posture to which the springs of the control law pull the part.
         """
         self._law.rest(part, self.q[self._where[part]])
 
@@ -134,7 +138,10 @@ class RobotLaw:
             self.seek_posture(part)
 
     def seek_posture(self, part: str) -> None:
-        """Set the attractor of a part that no service owns to the part's posture in the settings, if there is one."""
+        """Set the attractor of a part to the part's posture in the settings; nothing happens if the settings have none.
+
+        Call this only for a part that has no owner (a service that may set its attractor): the method does not check this.
+        """
         if part in self._config.posture:
             self._law.set_attractor(part, np.array(self._config.posture[part]))
 
@@ -158,8 +165,8 @@ class RobotLaw:
     def settle_speeds(self, part: str) -> tuple[Array, Array]:
         """Return commanded velocity and acceleration of the part's motors, (n_part,) each, by which the end of a motion is detected.
 
-        Units: rad/s and rad/s^2. For a motor that slides, the values in m/s and m/s^2 are divided by its length [m] in
-        `mobee.robot.motor_units.fine_units`: this length counts as 1 rad.
+        Units: rad/s and rad/s^2. For a motor that slides, the values in m/s and m/s^2 are divided by the distance [m] that counts as 1 rad
+        for this motor, as `mobee.robot.motor_units.fine_units` gives it.
         """
         where = self._where[part]
         return self._law.velocity[where] / self._units[where], self._law.acceleration[where] / self._units[where]
@@ -169,7 +176,8 @@ class RobotLaw:
     def reach(self, part: str, marker: str, target: ReachTarget) -> None:
         """Begin to pull a marker (a named point on a link) to a target by forces on the part.
 
-        Raises UnknownName for an unknown part or marker, InvalidValue if no motor of the part that may move moves the marker.
+        Raises UnknownName for an unknown part or marker. Raises InvalidValue if the part has no motor that moves the marker, or if all such
+        motors are forbidden to move (weight 0 in the gains).
         """
         self._law.reach_toward(part, marker, target)
 

@@ -134,7 +134,11 @@ class ControllerNode:
                 self._regain(part, tick)
 
     def _lose(self, part: str, tick: Tick, state: PartStatus, why: str) -> None:
-        """Suspend the action of a part that is not under control, or end it."""
+        """Suspend the action of a part that is not under control if it may continue later, or else end it and hold the part.
+
+        `Action.may_continue` decides, but no action continues after an emergency stop. A suspended action remains suspended as long as it
+        may continue. `why`: the reason, for the messages.
+        """
         action = self._actions[part]
         may_continue = action.may_continue(tick.t * 1e-9, state.gate) and not self._drives.is_stopped
         if may_continue and action.status == "moving":

@@ -12,7 +12,10 @@ from bus_schema.authority import BEHAVIOURS
 
 
 def rank_of(who: str) -> int:
-    """Return the rank of the service named `who`: for a behaviour its index in BEHAVIOURS ("assist", "gaze"), for every other service 2."""
+    """Return the rank of the service named `who`; a service may take a part from an owner of lower rank.
+
+    The rank of a behaviour is its index in BEHAVIOURS: "assist" 0, "gaze" 1. The rank of every other service is 2, the highest.
+    """
     return BEHAVIOURS.index(who) if who in BEHAVIOURS else len(BEHAVIOURS)
 
 

@@ -115,9 +115,10 @@ class CommandPublisher:
     def send(self, k: int, orders: dict[str, Order], reference: Array, answer: Answer | None = None) -> None:
         """Publish the commands of tick k, if there are any.
 
-        `orders`: for each commanded part, the epoch (number of this controller's ownership of the part's drive) and the kind of command.
-        `reference`: command of every motor, (n,) rad, rad/s or N m, by the modality (kind of command) in the settings. `answer`: in
-        lockstep, the answer to the tick, sent in the same message; None: the message has no answer.
+        `orders`: for each commanded part, the epoch (number of this controller's ownership of the part's drive) and the kind of command:
+        "hold" (brake and stand still), or the `modality` in the settings ("position", "velocity" or "torque"). `reference`: value for every
+        motor of the robot, (n,), in rad, rad/s or N m by this modality. `answer`: in lockstep, the answer to the tick, sent in the same
+        message; None: the message has no answer.
         """
         self._sent = k, orders
         if orders:
@@ -138,11 +139,12 @@ class CommandPublisher:
     def send_and_answer(self, tick: Tick, fresh: bool, orders: dict[str, Order], reference: Array) -> None:
         """In lockstep, publish the commands of a tick, and answer the tick in the same message.
 
-        While a part is being armed (permitted to follow commands), the answer is delayed and sent in a message of its own. It is also a
-        message of its own for tick 0, and if there are no commands. robot_sim repeats tick 0 until all participants have answered it; it is
-        answered only if all parts that can be armed are armed, the commands have a subscriber, and the forces are fresh. `fresh`: whether
-        the forces of the model may be used. `orders`: for each commanded part, the epoch (number of this controller's ownership of the
-        part's drive) and the kind of command. `reference`: command of every motor, as in `send`.
+        The answer is a message of its own for tick 0, if there are no commands, and while a part is being armed (permitted to follow
+        commands); in the last case it is sent when the arming has ended. Tick 0 is answered only if all parts that can be armed are armed,
+        the commands have a subscriber, and `fresh` is true; otherwise nothing is sent, and robot_sim repeats tick 0.
+
+        `fresh`: whether the forces of the model may be used. `orders`: for each commanded part, the epoch (number of this controller's
+        ownership of the part's drive) and the kind of command. `reference`: command of every motor, as in `send`.
         """
         if tick.k == 0 and not (fresh and self._is_ready(tick)):
             return

@@ -49,7 +49,10 @@ class Reach:
 
 
 class Reaches:
-    """Begins, follows and ends the reaches of all parts."""
+    """Begins, updates and ends the reaches of all parts.
+
+    In a reach a force pulls a marker (named point of a link) of the part to a target, until the part settles or times out.
+    """
 
     def __init__(self, bus: Bus, robot: Robot, law: RobotLaw, actions: Mapping[str, Action]) -> None:
         self._bus, self._robot, self._law, self._actions = bus, robot, law, actions

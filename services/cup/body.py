@@ -33,8 +33,9 @@ class Bumped(Exception):
 class BusBody(BusFollower):
     """The running robot as a `mobee.behaviours.pick.Body`: moves the parts `parts` along paths, by their attractors.
 
-    `gains`: the gains of the running controller's law. `require_seen`: called before attractors are set, and after
-    each wait; it raises an error to end the motion, for example if the cup was not seen for too long.
+    The attractor of a part is the posture to which the springs of the control law pull it. `gains`: the gains of the running controller's
+    law. `require_seen`: called before attractors are set, and after each wait; it raises an error to end the motion, for example if the cup
+    was not seen for too long.
     """
 
     def __init__(self, service: Service, robot: Robot, parts: Sequence[str], gains: Gains, require_seen: Callable[[], None]) -> None:
@@ -48,13 +49,15 @@ class BusBody(BusFollower):
             service.on_each(State, partial(self._note_state, part), part)
 
     def follow_path(self, path: Array, speed: float, watch: BumpWatch | None = None, forces: Forces | None = None) -> Followed:
-        """Move along a path (K, n) rad, and wait until the parts rest.
+        """Move the parts of this body along a path of whole postures, (K, n) rad; then wait until they rest, for at most 1.5 s (CALM).
 
         Returns whether the arm has bumped into something, and the posture (n,) rad at the bump, or, without a bump, at the end of the
-        motion. `speed`: share of the motors' largest speed, above 0 and at most 1. `watch`: detects bumps; None: they are not detected.
-        `forces`: function that takes a posture (n,) rad and returns the forces (n,) rad/s^2 of the control law except spring and damping.
-        The attractors are shifted such that their springs cancel these forces; None: they are not cancelled. After a bump the robot moves
-        back to the posture that it had 3 s (BACK) before the bump.
+        motion. After a bump the robot moves back to the posture that it had 3 s (BACK) before the bump. Raises MobeeError if the motion
+        cannot be continued, for example because another service has taken a part, or the robot's clock stands still.
+
+        `speed`: share of the motors' largest speed, above 0 and at most 1. `watch`: detects bumps; None: they are not detected. `forces`:
+        function that takes a posture (n,) rad and returns the forces (n,) rad/s^2 of the control law except spring and damping. The
+        attractors are shifted such that their springs cancel these forces; None: they are not cancelled.
         """
         robot = self.robot
         rows = list(attractors(robot, timed(robot, np.clip(path, *robot.limits.T), self._gains, speed), self._gains, forces))
@@ -78,14 +81,17 @@ class BusBody(BusFollower):
         return Followed(False, self.q)
 
     def press(self, q: Array, seconds: float) -> None:
-        """Set the attractors of the parts to the posture q (n,) rad, without a path, and wait for `seconds` of the robot's clock."""
+        """Set the attractors of this body's parts to the posture q (n,) rad at once, without a path, and wait for `seconds`.
+
+        The attractor of a part is the posture to which the control law pulls it. The time is that of the robot's clock.
+        """
         self._step(q)
         self._wait_until(self._now + seconds)
 
     def rest_at(self, q: Array) -> None:
-        """Set the attractors of the parts to the posture q (n,) rad, and wait until the commanded speeds are almost 0.
+        """Set the attractors of this body's parts to the posture q (n,) rad, and wait until the commanded speeds are almost 0.
 
-        The wait takes at most 1.5 s (CALM) of the robot's clock.
+        The attractor of a part is the posture to which the control law pulls it. The wait takes at most 1.5 s (CALM) of the robot's clock.
         """
         self._step(q)
         self._calm()

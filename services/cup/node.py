@@ -151,7 +151,10 @@ class CupNode:
         return centre if np.linalg.norm(picker.slipped(thing, centre)) < SLIP else None
 
     def _goals(self, thing: Upright, azimuth: float) -> list[Array]:
-        """Return free places for the thing on the table."""
+        """Return random places, each (2,) m in the root frame, to which the thing on the table can be moved, far from all other things.
+
+        `azimuth`: direction that the palm faced in the grasp [rad], see `places_near`. The list can be empty.
+        """
         rng = np.random.default_rng([self._config.seed, self._done, 437])
         places = places_near(thing.place, azimuth, SHIFTS, GOALS, rng)
         others = [
@@ -199,9 +202,10 @@ class CupNode:
         return self._service.call(keys.world_rpc("list"), Empty, WorldReply, tries=TRIES).objects
 
     def _set_roles(self, role: Role) -> None:
-        """Set the role of all things that vision has found, in the model's world: the hand comes nearer to ghosts than fields let it.
+        """Set the role of all things that vision has found, in the world of the service `model`.
 
-        What the hand must not touch is then kept away by the plans alone.
+        The hand can grasp a "ghost", since it has no field (volume of repulsive force). Only the planned motions then keep the hand away
+        from a ghost that it must not touch.
         """
         try:
             for item in self._objects():

@@ -105,9 +105,11 @@ NAMES = (*list(_ENTRIES)[:3], AGENT + "<part>", *list(_ENTRIES)[3:])
 
 
 def entry_of(who: str, module: str | None) -> Entry | None:
-    """Return the catalogue's entry of the service `who`; None if the service is unknown and no `module` is given.
+    """Return the fixed properties of the service `who` as an Entry; None if the service is unknown and no `module` is given.
 
-    `module`: a program that replaces the shipped one, or the program of a service that is not shipped.
+    `module`: a program that replaces the shipped one, or the program of a service that is not shipped; None: the shipped program. With a
+    `module`, the entry has this program, the settings class `Config` of its module `config`, and no needed packages; an unknown service
+    waits for the controller.
     """
     entry = _ENTRIES.get(who)
     if who.startswith(AGENT):

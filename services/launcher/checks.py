@@ -225,7 +225,10 @@ def check_services(scenario: Scenario, robots: Mapping[str, Robot]) -> None:
 
 
 def _setting_in(part: Part, text: str) -> str:
-    """Return the setting of a service whose value an error quotes, with its tables; the service's table if there is none."""
+    """Return the setting of a service that an error message is about, as "services.NAME.SETTING".
+
+    It is the first setting whose value is a string that the message `text` quotes. If there is none, the result is "services.NAME".
+    """
     values = ((name, getattr(part.config, name)) for name in part.config.__struct_fields__)
     named = next((f".{name}" for name, value in values if isinstance(value, str) and value and repr(value) in text), "")
     return f"services.{part.who}{named}"

@@ -146,9 +146,10 @@ class Child:
     def spawn(self, launcher: str) -> None:
         """Start the process, or use the standby process if there is one.
 
-        The process imports its packages and reads its robot, then waits for `release` before it joins the system. `launcher`: value of the
-        environment variable HELD: id of the router that the process may join and, if this host has joined the system of another host, the
-        process id of the launcher. Raises OSError if the operating system refuses to start the process.
+        The process imports its packages and reads its robot, then waits for `release` before it joins the system. `launcher`: the id of the
+        router that the process may join; if this host has joined the system of another host, a blank and the process id of this launcher
+        follow. The process gets this text in the environment variable MOBEE_HELD. Raises OSError if the operating system refuses to start
+        the process.
         """
         if self.standby is not None and self.standby.poll() is not None:
             self.dismiss()

@@ -36,8 +36,8 @@ class Connection:
     `who`: name of this launcher on the bus. `endpoint`: address at which its services reach the router. `session`: the launcher's session.
     `router`: the router, if this launcher has opened it; None: the router is on another host. `local`: second address of the router, for
     services of this host in lockstep (every tick waits for all participants); empty: none. `security`: keys with which the connections are
-    secured; None: they are not secured. `refusals`: log of what a secured router refuses. `first`: agreement with the first launcher, if
-    this launcher has joined another host; None: this launcher is the first.
+    secured; None: they are not secured. `refusals`: log of what a secured router refuses. `first`: what the first launcher, whose host runs
+    the router, has prescribed (version, and settings of the services); None: this launcher is the first.
     """
 
     who: str

@@ -24,7 +24,10 @@ SERVICES = "services"  # word in the status of the launcher of another host: the
 
 @dataclass
 class Remote:
-    """State of a service that another host runs, as this launcher observes it by liveliness tokens and `stat` calls.
+    """State of a service that another host runs, as this launcher observes it over the bus.
+
+    The launcher sees the service's liveliness token (a key on the bus that exists as long as the process runs), and asks for its status by
+    `stat` calls.
 
     Times are monotonic, in s. `who`: name. `vital`: whether the robot is stopped if the service is given up. `phase`: waiting (not yet
     present), starting, ready, failed (absent or silent) or fault (given up). `since`: time of the last change of phase. `absent_since`:

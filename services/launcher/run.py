@@ -318,7 +318,10 @@ class _Run:
         self._service.spin(time.monotonic() + seconds, lambda: self._over() or enough())
 
     def _mark(self) -> None:
-        """Start the measurement of every service now; those of a joined host belong to the first host's measurement."""
+        """Let all ready services begin to count for the measurements of the run, and wait up to 2 s for their answers.
+
+        On a host that has joined the system of another host this does nothing: the launcher of the first host does it for all services.
+        """
         waiting: set[str] = set()
         for child in self._shown if self._bus.first is None else ():
             if child.phase == "ready":
@@ -328,7 +331,7 @@ class _Run:
         self._spin(2.0, lambda: not waiting)
 
     def _ask_final_numbers(self) -> None:
-        """Ask for the final numbers: the last ones are up to half a second old."""
+        """Ask all services for their statistics once more, at the end of the run: the last replies are up to half a second old."""
         asked = time.monotonic()
         for child in self._children:
             if child.phase == "ready":
@@ -350,7 +353,7 @@ class _Run:
         return f"waits for another host to start {names}, with `mobee launch {self._options.scenario} {options}`"
 
     def _note_router(self, who: str, instance: str, up: bool) -> None:
-        """Report on a joined host whether the router of the first one is reachable."""
+        """Report whether the router of the first host is reachable, if this host has joined a system that runs there."""
         if self._bus.first is None or who != "router" or instance != self._bus.first.instance:
             return
         if up:
@@ -359,7 +362,7 @@ class _Run:
             self._announce(f"the router at {self._bus.endpoint} is not reachable: the services of this host wait for it")
 
     def _note_new_system(self) -> None:
-        """End the services of a joined host when the system of the first one was started again, to join the new one."""
+        """End the services of this host, so that it joins again: the system of the first host, which it had joined, was started again."""
         self._announce(f"the system at {self._bus.endpoint} was started again: this host joins it")
         self._join_again = True
         self._request_stop()
@@ -392,7 +395,10 @@ class _Run:
             self._announce(f"robot_sim is still at tick 0: {sim.stat.text}")
 
     def _announce_stop(self) -> None:
-        """Report the stop of an earlier run, or release it if an earlier launcher, which has ended, said it."""
+        """Handle an emergency stop that an earlier run has recorded: report it to the user, or release it.
+
+        It is released only if the launcher of that run, which has ended, had sent it.
+        """
         stop = None if self._record is None else self._record.read()
         if self._record is not None and stop is not None and stop.source == BY_LAUNCHER:
             self._record.release()

@@ -174,7 +174,10 @@ def _find(name_or_path: str) -> Path:
 
 
 def _override(data: dict[str, Any], settings: Sequence[str]) -> dict[str, str]:
-    """Write the settings into the data; return, for each field that was set, the setting."""
+    """Write the settings (texts "table.field=value") into the data of a scenario.
+
+    Returns a dict from each field that was set, as "table.field", to the text that set it. Raises ConfigError.
+    """
     origins = {}
     for setting in settings:
         field, equals, value = setting.partition("=")
@@ -206,7 +209,10 @@ def _value(text: str) -> Any:
 
 
 def _where_or_shared(file: _File, where: Callable[[str], str]) -> Callable[[str], str]:
-    """Return a function like `where` that returns the place in [shared] for a service's field that is set there."""
+    """Return a function like `where`, from a field to its place (file and line), that also knows the table [shared].
+
+    For a field of a service that is set only in [shared], it returns the place of the field in [shared].
+    """
 
     def find(field: str) -> str:
         match field.split(".", 3):

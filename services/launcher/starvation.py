@@ -13,7 +13,7 @@ PERIOD = 0.2  # s between two readings of the threads
 
 @dataclass(frozen=True, slots=True)
 class _Thread:
-    """A thread at one time."""
+    """The time that a thread has run and waited for a processor, measured at one moment; the units are beside the fields."""
 
     ran: int  # ns on a processor since its start
     waited: float  # s ready to run without one, up to the last time that it ran

@@ -62,11 +62,17 @@ class EmergencyStops:
                 self._keep(stop)
 
     def _is_launcher(self, who: str) -> bool:
-        """Return whether a launcher has sent a stop: each repeats its own, and two would repeat each other's without end."""
+        """Return whether `who`, the sender of a stop, is a launcher. A stop from a launcher is ignored.
+
+        Reason: every launcher repeats the stops that it knows, so two launchers would repeat each other's stops without end.
+        """
         return who == self._service.who or who == BY_LAUNCHER or who.startswith(HOST_LAUNCHER)
 
     def _was_just_confirmed(self) -> bool:
-        """Return whether robot_sim is stopped, or was a moment ago: a stop that it knows could be repeated after its release."""
+        """Return whether robot_sim has published an emergency stop during the last 0.2 s, thus is stopped or was a moment ago.
+
+        A stop that arrives in this time is ignored: the launcher could repeat it after the release, and so stop the robot again.
+        """
         return time.monotonic() - self._confirmed < JUST_CONFIRMED
 
     def _was_just_released(self) -> bool:

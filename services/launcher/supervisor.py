@@ -56,8 +56,7 @@ class Supervisor:
             programs: programs of the services that this host starts.
             stops: stops the robot when a vital service is given up.
             announce: called with each line that a user should see.
-            held: value of the environment variable HELD of the processes, which names the router that they may join; empty: that of this
-                launcher.
+            held: which router the processes may join, as the argument `launcher` of `Child.spawn`; empty: the router of this launcher.
             elsewhere: services that other hosts start, by name; some services here wait for them.
             is_reachable: returns whether the router can be reached; without it no service can start or answer.
         """
@@ -171,9 +170,11 @@ class Supervisor:
                 self._service.log.warning("no standby process of %s: %s", child.who, error)
 
     def _is_frozen(self, child: Child, now: float) -> bool:
-        """Test calls and time: a call on a dropped connection fails at once, and the launcher itself may have been stopped for a while.
+        """Return whether a service is frozen: several calls and a long time without an answer.
 
-        A service that waits for a processor, or whose inbox advances, is slow but not frozen.
+        Both are required, because a call on a dropped connection fails at once, and the launcher itself may have been stopped for a while.
+
+        A service that waits for a processor, or that still handles messages, is slow but not frozen.
         """
         limit = max(FROZEN_TIME_NICE if child.program.nice >= NICE_SERVICE else FROZEN_TIME, child.program.patience)
         return child.unanswered >= MAX_UNANSWERED and now - child.answered_at >= limit and child.silence(now) >= limit
@@ -192,7 +193,7 @@ class Supervisor:
             self._ask_pulse(child)
 
     def _ask_pulse(self, child: Child) -> None:
-        """Ask a silent service whether its inbox advances."""
+        """Ask a service that does not answer `stat` how many messages it has handled: if the number grows, it is slow, not frozen."""
         pid = child.pid
 
         def note(answer: Pulse | CallFailed) -> None:

@@ -87,7 +87,10 @@ class ModelNode:
         self._reaching = None
 
     def _note_reach(self, part: str, reach: Reach) -> None:
-        """Store which markers reach, so that targets exert no force on their hands."""
+        """Store the newest message about a reach (motion of a marker, a named point of a link, to a target).
+
+        While the reach lasts, targets exert no force on the hand of this marker.
+        """
         if reach.marker not in self._robot.markers:
             self._service.bus.reject("value", f"a reach of {part} with the marker {reach.marker!r}, which this robot does not have")
             return
@@ -190,7 +193,10 @@ class ModelNode:
 
 
 def _encoder_offsets(config: Config, robot: Robot) -> Array | None:
-    """Return the true positions minus those of the encoders (n,) rad by the calibration; None without one.  Raises InvalidValue."""
+    """Return the true positions minus those of the encoders (n,) rad, from the calibration file; None if no file is configured.
+
+    Raises InvalidValue if the file cannot be read, or belongs to another robot or other cameras.
+    """
     if not config.calibration:
         return None
     return load_calibration(config.calibration).errors(robot, cameras_of(robot)).encoders

@@ -34,9 +34,10 @@ class WorldServer:
     """Changes the world of a model. Clients request changes by calls; vision sends the objects that it perceives."""
 
     def __init__(self, service: Service, model: Model, sigmas: float, ghosts: Collection[str] = ()) -> None:
-        """`sigmas`: number of standard deviations of a perceived object's position by which its shape is enlarged.
+        """Begin to answer the calls that edit the world of `model`, and to receive the objects that vision perceives.
 
-        `ghosts`: names of perceived objects that get the role ghost instead of the role that vision sends.
+        `sigmas`: number of standard deviations of a perceived object's position by which its shape is enlarged. `ghosts`: names of
+        perceived objects that get the role "ghost" (exerts no force on the robot) instead of the role that vision sends.
         """
         self._service, self._model, self._sigmas, self._ghosts = service, model, sigmas, frozenset(ghosts)
         self.latency = Percentiles()  # ms from the picture that shows an object to its place in the world
@@ -100,7 +101,10 @@ class WorldServer:
             self._expiry[seen.name] = seen.valid_until
 
     def _margin(self, seen: WorldObject) -> float:
-        """Return by how much a perceived shape is enlarged [m]; it stays while it is about right, so that shapes need not change."""
+        """Return the distance [m] by which a perceived shape is enlarged for its position uncertainty.
+
+        The present distance is kept if it is enough and not much too large, so that the shape need not change.
+        """
         largest = float(np.linalg.eigvalsh(np.array(seen.covariance).reshape(3, 3))[-1])
         wanted = self._sigmas * np.sqrt(max(largest, 0.0))
         present = self._margins.get(seen.name, 0.0)
@@ -125,7 +129,10 @@ class WorldServer:
         self._expiry.pop(request.name, None)
 
     def _require_presenter(self, who: str) -> None:
-        """Refuse a second service that presents a target, since both would move the same object; raises CallRefused."""
+        """Refuse a second service that presents a target (object to reach for), since both would move the same object.
+
+        Raises InvalidValue, with which the call of `who` is refused, if another running service presents it; else `who` now presents it.
+        """
         other = self._presenter
         if TARGET in self._model.world.objects and other != who and self._service.alive.get(other):
             raise InvalidValue(
@@ -150,7 +157,11 @@ class WorldServer:
         world.detach(name)
 
     def _set_role(self, world: World, request: SetRole) -> None:
-        """Set a role; that of a perceived object stays also while vision moves it, until it is removed."""
+        """Set the role of an object.
+
+        If vision perceives the object, the role is also stored until the object is removed, since every new message of vision would reset
+        it.
+        """
         world.set_role(request.name, request.role)
         if request.name in self._perceived:
             self._roles[request.name] = request.role

@@ -52,9 +52,9 @@ class Story:
     """
 
     def __init__(self, run: Path) -> None:
-        """Read the record in the folder `run`.
+        """Read the record in the folder `run`, and load the robot that the file `monitor.toml` in this folder names.
 
-        Raises MobeeError if it cannot be read, contains no pose, or belongs to a robot with another number of motors.
+        Raises MobeeError if a file cannot be read, the record contains no pose, or its poses have another number of motors than the robot.
         """
         found = entries(run / STORY)
         self.tracks = _tracks(found)

@@ -163,7 +163,10 @@ class Forwarder:
             self._up.put(set=stop.set, source=stop.source, reason=stop.reason)
 
     def _note_alive(self, who: str, instance: str, up: bool) -> None:
-        """Declare the router's token in the clients' namespace, since a client without a router ends."""
+        """Declare the router's liveliness token (sign that it runs) for the clients too: a client that sees no router ends.
+
+        It is declared in the clients' namespace while it exists in the robot's namespace.
+        """
         if who != "router":
             return
         if up:

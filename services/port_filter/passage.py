@@ -189,7 +189,11 @@ class Streams:
             self.answered(commands, commands.answer)
 
     def _publish_state(self, part: str, state: State) -> None:
-        """Publish a state of the robot to the clients, with their command numbers."""
+        """Publish the state of a part to the clients.
+
+        Its `cmd_seq` is the number that the client gave to its command, not the one that the filter gave to it when it forwarded the
+        command.
+        """
         self._twin.bus.run = self._service.bus.run
         shown = self._for_clients(part, state)
         self._streams[part].put(

@@ -165,7 +165,7 @@ class RecorderNode:
         receive_together(self._sockets, 1)
 
     def _tidy(self) -> None:
-        """Return free memory, and find the connections, which can be others after a cut of the network."""
+        """Return free memory to the system, and list the TCP sockets to the router again: after a cut of the network they are new ones."""
         return_free_memory()
         self._sockets = sockets_at(self._service.config.endpoint)
         self._service.inbox.at(time.monotonic() + TIDY_PERIOD, self._tidy)
@@ -220,7 +220,10 @@ class RecorderNode:
         self._messages += len(arrived)
 
     def _number_of(self, message: Raw) -> int:
-        """Return the number that the sender gave to a message; count the messages between it and the last one."""
+        """Return the sequence number that the sender gave to a message, modulo 2^32; 0 if it has none.
+
+        If numbers are missing since the last message of this sender and key, these messages count as lost.
+        """
         sender = sender_of(message.payload)
         if sender is None:
             return 0
@@ -234,7 +237,7 @@ class RecorderNode:
         return seq & 0xFFFFFFFF
 
     def _new_channel(self, message: Raw) -> tuple[Channel, str]:
-        """Return the channel of a key and an encoding, and the type of its messages; "" if the contract has none of this encoding."""
+        """Return the channel of the key and encoding of a message, and the name of its message type; "" if no type has this encoding."""
         if len(self._channels) >= KNOWN:
             self._channels.clear()
         kind = self._kinds.get(message.encoding, "")

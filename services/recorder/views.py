@@ -75,7 +75,10 @@ class _Due:
         self._next: dict[str, int] = {}  # ns since 1970
 
     def at(self, message: Raw) -> bool:
-        """Return whether a copy of this message is due."""
+        """Return whether this message is to be copied: the period of the rate has passed since the last copied message of its key.
+
+        Always False if the rate is 0.
+        """
         if not self._period or message.received < self._next.get(message.key, 0):
             return False
         self._next[message.key] = message.received + self._period

@@ -130,7 +130,11 @@ class BulletBackend:
         motors.efforts = efforts
 
     def _apply_torques(self, in_torque: Mask, target: Array, fastest: tuple[Array, Array], h: float) -> Share:
-        """Set the torques of joints in torque mode, and the velocities of the others."""
+        """Set, for a substep of `h` [s], the torques of the joints in torque mode and the velocities of the others; return these commands.
+
+        `in_torque`: which joints are in torque mode. `target`: velocities [rad/s] of the others. `fastest`: lowest and highest velocity of
+        each joint [rad/s]. All arrays are (d,), by joint.
+        """
         scene = self._scene
         torque = self.motors.torques[scene.motors]
         share = self._gears.transmit(scene.motion(self.motors.q), torque, in_torque, target, fastest, self._touched, h)

@@ -431,9 +431,10 @@ class Gate:
         return self._begun[-ago] if ago <= len(self._begun) else now
 
     def _check_delay(self, delay: int) -> None:
-        """Raise Refused if the tick that an order answers began too long ago; not in lockstep.
+        """Raise Refused if an order (command of a client) comes too late after the tick whose state it was computed from.
 
-        `delay`: ns since then. The age in ticks does not show this if this process itself was frozen, and made no ticks meanwhile.
+        `delay`: time since that tick began [ns]. In lockstep nothing is refused. The age in ticks is not sufficient, because this process
+        may have been frozen: then it has made no ticks meanwhile.
         """
         if self._ttl_ticks is None and delay > 1e9 * MAX_AGE * self._stretch:
             raise Refused("age", f"{self.part}: answers a tick that began {delay / 1e6:.0f} ms ago, limit {MAX_AGE * 1e3:.0f} ms")

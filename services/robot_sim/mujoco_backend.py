@@ -164,7 +164,7 @@ class MujocoBackend:
         return free, np.where(in_torque, within, target)
 
     def _change_gears(self, in_torque: Mask) -> None:
-        """Give motors in torque mode the inertia and the friction of the law, and other motors their own."""
+        """Set the inertia and friction of the motors: in torque mode those of the control law (`mobee.control.law`), else their own."""
         if (in_torque == self._geared).all():
             return
         scene = self._scene

@@ -195,7 +195,10 @@ class MujocoScene:
         return len(watched)
 
     def _add_pair(self, spec: Any, geoms: GeomPair, names: GeomPair, things: Sequence[WorldObject]) -> None:
-        """`things`: the objects of the pair; of two that move, the rougher one determines the friction."""
+        """Add one pair of geoms to the MuJoCo model, unless `left_out` contains the pair. `things`: the world objects of the pair, 0 to 2.
+
+        If objects of the pair move, the rougher of them determines the friction.
+        """
         if frozenset(names) in self.left_out:
             return
         rough = max((thing.friction for thing in things if _moves(thing)), default=None)
@@ -255,7 +258,10 @@ def reflected_inertia(motor: Motor) -> float:
 
 
 def _share(amount: float, motor: Motor, scale: float) -> float:
-    """Return the inertia or friction of one of the motor's joints, all of which together are `amount` at the motor."""
+    """Return the share of one joint in an inertia or friction `amount` at the motor, in the joint's own coordinate.
+
+    The joints of a motor get equal shares. `scale`: joint motion per motor motion.
+    """
     return amount / (len(motor.joints) * scale**2)
 
 

@@ -115,7 +115,10 @@ class RendererNode:
         return picture
 
     def _expose_soon(self) -> None:
-        """Expose after the messages that wait already: drawing may have taken longer than the time between two pictures."""
+        """Schedule the drawing of imperfect pictures (`_expose`) after the messages that wait in the inbox.
+
+        Otherwise they would be delayed, because the last drawing may have taken longer than the time between two pictures.
+        """
         if not self._will_expose:
             self._will_expose = True
             self._service.inbox.put(lambda: self._service.bus.guarded("pictures", self._expose))
@@ -203,7 +206,10 @@ class RendererNode:
 
 
 def _scene(config: RendererConfig, robot: Robot, mount: Array, around: list[Solid]) -> Scene:
-    """Return the scene; `mount` (6,): of the tag on the palm."""
+    """Return the scene to draw: robot, world, cameras, and the tag on the palm.
+
+    `mount`: (6,), displacement [m] and rotation vector [rad] of the true tag relative to that of the model. `around`: further solids.
+    """
     worn = tag_solids(Tag(config.tag), robot, mount) if config.tag else []
     return Scene(robot, config.load_world(), cameras_of(robot, config.cameras), config.width, config.height, worn, around)
 

@@ -87,7 +87,7 @@ class VisionNode:
         self._try_locate()
 
     def _try_locate(self) -> None:
-        """Locate all things, once all four messages of a tick are there."""
+        """Locate all things, as soon as the messages Image and Camera of every camera have arrived, all of the same tick."""
         parts: list[Image | Camera] = [*self._images.values(), *self._cameras.values()]
         if len(parts) < 2 * len(self._rig.cameras) or len({part.k_capture for part in parts}) > 1:
             return
@@ -118,7 +118,10 @@ class VisionNode:
         return np.frombuffer(image.data, dtype=np.uint8).reshape(image.height, image.width, 3)
 
     def _eyes(self) -> Eyes:
-        """Return the cameras at the stamp; raises InvalidValue for a message that does not fit the robot."""
+        """Return the poses and the lens of the two cameras at the time stamp of the newest message Camera.
+
+        Raises InvalidValue if this message does not have one position and velocity for each motor of the robot.
+        """
         camera = self._cameras[next(iter(self._rig.cameras))]
         motors = len(self._rig.robot.motors)
         if len(camera.q) != motors or len(camera.dq) != motors:

@@ -116,7 +116,10 @@ def findings(found: Cells) -> dict[str, Any]:
 
 
 def _outperforms(known: Solvers) -> Measured | None:
-    """Judge each NES against all rivals of the thesis."""
+    """Judge for each of the two NES whether each rival of the thesis needs more evaluations with 41 motors.
+
+    Returns the numbers as text, and for each NES True, False, or None (not decided).  Returns None if a solver has no results.
+    """
     if not {(name, WHOLE) for name in (*OURS, *THEIRS)} <= known.keys():
         return None
     parts, found = list[str](), dict[str, bool | None]()

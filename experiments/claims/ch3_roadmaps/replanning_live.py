@@ -275,7 +275,10 @@ class ContactStopPlant(BusPlant):
         self.on_forces(forces.re_k)
 
     def _note_commands(self, commands: Commands) -> None:
-        """Store the tick in which the first command computed after the request acts: one tick after its own."""
+        """Store the first tick in which the motors execute a command that was computed after the request of the motion.
+
+        It is one tick after the tick of the state from which this command was computed.
+        """
         if self.commanded < 0 and commands.re_k > self.asked > 0:
             self.commanded = commands.re_k + 1
 

@@ -409,7 +409,10 @@ def plot(found: Cells, live: Mapping[str, Any] | None = None) -> Any:
 
 
 def _places(samples: Array) -> Array:
-    """Return the positions of the palm in the poses, seen from the front, (V, 2) m."""
+    """Return the coordinates y and z of the palm in V poses, (V, 2) m, root frame.
+
+    `samples`: the poses, as positions of the moving joints.
+    """
     whole = np.repeat(robot().home[None], len(samples), axis=0)
     whole[:, [robot().motor_index(joint) for joint in joints()]] = samples
     places: Array = Model(robot()).evaluate(whole).position(MARKER)[:, 1:]

@@ -360,7 +360,10 @@ def _least(shares: Mapping[str, Mapping[str, float]]) -> str:
 
 
 def _points(reach: Array | None, maps: Sequence[CellResult], own: CellResult) -> Array | None:
-    """Return the task points reached by the search or by any other map, (R, m)."""
+    """Return the task points (R, m) that the robot can reach: those that the search found, and the vertices of all maps except `own`.
+
+    `reach`: the points of the search for reachable points; None: it has not ended, and None is returned.  `maps`: all maps of the task.
+    """
     return None if reach is None else np.concatenate([reach, *(one.values["y"] for one in maps if one is not own)])
 
 

@@ -215,7 +215,10 @@ def _count(commands: Sequence[Judged], outcome: Outcome) -> int:
 
 
 def _rms(squares: Sequence[float], trials: Sequence[Trial]) -> float:
-    """Return the root of mean squares, one per trial, weighted by their durations."""
+    """Return the root mean square of a quantity over all trials.
+
+    `squares`: for each trial, the mean of the squared quantity; it is weighted by the duration of the trial.
+    """
     return float(np.sqrt(np.average(squares, weights=[trial.seconds for trial in trials])))
 
 

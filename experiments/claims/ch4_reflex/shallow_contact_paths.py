@@ -128,9 +128,9 @@ class Table:
     def _edge(self, touching: Array, position: Array, rotation: Array, heading: float) -> Spot | None:
         """Return the spot at which the contact begins, by bisection of the height of the hand.
 
-        `touching`: posture (n,) rad in which the hand touches the table; one step higher (STEP) it did not.  `position` (3,) m and `rotation`
-        (3, 3): pose of the hand in this posture, root frame.  `heading`: horizontal direction of the paths through the spot, angle [rad] from
-        the x axis.  Returns None if the arm cannot reach one of the heights with this rotation.
+        `touching`: posture (n,) rad in which the hand touches the table; one step higher (STEP) it did not.  `position` (3,) m and
+        `rotation` (3, 3): pose of the hand in this posture, root frame.  `heading`: horizontal direction of the paths through the spot,
+        angle [rad] from the x axis.  Returns None if the arm cannot reach one of the heights with this rotation.
         """
         low, high, q = position[2], position[2] + STEP, touching
         for _ in range(8):
@@ -191,7 +191,7 @@ class Table:
 
 
 def _is_on_table(violations: Sequence[Violation], touching: tuple[str, ...]) -> bool:
-    """Return whether all violations are contacts with the table of shapes with one of the name prefixes."""
+    """Return whether every violation is a contact between the table and a robot shape whose name begins with a prefix in `touching`."""
     return all(v.kind == "contact" and v.what.endswith(" - table") and v.what.startswith(touching) for v in violations)
 
 

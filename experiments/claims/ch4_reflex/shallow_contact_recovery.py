@@ -157,7 +157,10 @@ class Truth:
             self._conclude(self._first, self._depths[-1])
 
     def _follow(self, recovery: Recovery, depth: float) -> None:
-        """Follow the first recovery until control is given back."""
+        """Record the depth of a tick of the first recovery, and compute its results when it has ended.
+
+        `recovery`: the present recovery.  `depth`: depth of the deepest contact in this tick [m].
+        """
         if self._first is None:
             self._first = recovery
         self._depths.append(depth)
@@ -301,7 +304,10 @@ class _Body:
         return q
 
     def tick(self, mode: str, reference: Array) -> None:
-        """Run for a tick with a command formed in the previous tick."""
+        """Simulate one tick, in which the motors execute the command that was computed in the previous tick.
+
+        `mode`: "velocity" or "position".  `reference`: the command for all motors (n,), in rad/s or rad.
+        """
         self._motors.command(slice(None), "velocity" if mode == "velocity" else "position", reference)
         self._motors.move(self._substeps, DT / self._substeps)
 

@@ -159,7 +159,11 @@ def _shown_balls(
 
 
 def _middle(name: str, balls: Sequence[Sighting], found: Calibration, moment: Moment, place: Array) -> Array | None:
-    """Return the middle (2,) px of the round red thing at a place (3,) m in a picture; None if it is not among those found there."""
+    """Return the middle (2,) px of the round red thing in a picture that is at a place (3,) m, root frame.
+
+    `name`: name of the camera.  `balls`: the round red things that were found in its picture.  `found` and `moment`: calibration and
+    encoder values, from which the pixel of the place is computed.  Returns None if no thing is within 5 px of this pixel.
+    """
     expected = see_points(rig(), name, found.x, moment.q[None], moment.dq[None], place[None, None]).pixels[0, 0]
     middle = min((rig().lens.project(one.direction) for one in balls), key=lambda pixel: float(np.linalg.norm(pixel - expected)))
     return middle if np.linalg.norm(middle - expected) < SAME else None
@@ -187,7 +191,10 @@ def random_gaze(rng: np.random.Generator) -> tuple[Array, Array]:
 
 
 def _millimetres(groups: Groups, field: str, share: float) -> list[float]:
-    """Return a quantile of the errors of each robot, mm."""
+    """Return for each robot a quantile of its errors of the ball's position, mm.
+
+    `field`: "before" or "after" the calibration.  `share`: which quantile, 0 to 1.
+    """
     return [1e3 * float(np.quantile(run[field], share)) for run in groups["hand"]]
 
 

@@ -124,7 +124,10 @@ def taught(poses: int, looks: int, seed: int) -> tuple[Lessons, float]:
 
 
 def _calibrated(postures: int, seed: int) -> Array:
-    """Return the parameters (P,) that the iCub of a seed finds by looking at its hand."""
+    """Return the calibration parameters (P,) of cameras and head encoders that one iCub finds with pictures of its own hand.
+
+    `postures`: number of postures of the hand.  `seed`: of the true errors of this iCub's cameras and encoders, and of the noise.
+    """
     chosen, icub = CameraSettings(samples=2), load_robot("icub")
     own = Rig(icub, cameras_of(icub), chosen.lens, Tag("left_palm"))
     model, errors = Model(icub, load_world("table")), camera_errors(chosen, icub, list(own.cameras), seed)

@@ -104,9 +104,9 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 def search(gains: str, forced: bool, tries: int, seed: int) -> Search:
     """Search for large violations: first by random tries, then by variations of the worst commands of each clause.
 
-    `gains`: name of the gain set.  `forced`: whether a client pushes.  `tries`: number of tries to make.  A run of the plant makes two
-    tries, one with each arm; if the number is odd, the last run counts only for the left arm.  Returns the final state.  `seed`: of the
-    random commands.
+    `gains`: name of the gain set.  `forced`: whether a client of the controller also applies forces to the arms.  `tries`: number of tries
+    to make.  A simulated run makes two tries, one with each arm; if the number is odd, the last run counts only for the left arm.  `seed`:
+    of the random commands.  Returns the final state.
     """
     state, numbers = Search(gains, forced, seed), Gains.named(gains)
     while state.tries < tries:

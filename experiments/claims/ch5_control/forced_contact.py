@@ -236,7 +236,11 @@ def findings(found: Cells) -> dict[str, Any]:
 
 
 def _grouped(found: Cells) -> tuple[dict[tuple[str, str], list[Record]], dict[tuple[str, str], list[Record]]]:
-    """Return the levels of force by gain set and wall, and the pulled hands by gain set and target."""
+    """Return two dicts that group the measurements: of pressed robots by (gain set, wall), and of pulled hands by (gain set, target).
+
+    Each value is a list of the records that `press` (one per level of force) or `draw_hand` (one per seed) returned.  Groups without
+    records are left out.
+    """
     pressed: dict[tuple[str, str], list[Record]] = {key: [] for key in product(GAINS, PUSHES)}
     drawn: dict[tuple[str, str], list[Record]] = {key: [] for key in product(GAINS, GOALS)}
     for result in found.values():

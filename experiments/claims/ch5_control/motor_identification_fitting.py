@@ -133,7 +133,11 @@ class _Problem:
         return difference
 
     def deviation(self, delay: Array, x: Array) -> Array:
-        """Return the standard deviations at the solution, (n, 3), in s, rad, rad/s."""
+        """Return the standard deviations of the fitted lag [s], backlash [rad] and friction [rad/s] of n motors, (n, 3).
+
+        They follow from the slopes of the residuals at the solution.  `delay`: (n,) s, the fixed delay of the fit.  `x`: (n, 3), the
+        solution: lag, backlash and friction in units of SCALE.
+        """
         here = self.residuals(delay, x)
         steps = DERIVATIVE_STEP * np.eye(len(SHAPED))
         slopes = np.stack([(self.residuals(delay, x + step) - here) / DERIVATIVE_STEP for step in steps], axis=-1)  # (n, ticks, 3)

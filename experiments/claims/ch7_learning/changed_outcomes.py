@@ -230,7 +230,10 @@ class Run:
 
     @property
     def errors(self) -> Array:
-        """The L1 error of the changed actions at each check after the change, divided by the error at the change, (checks_after,)."""
+        """The mean L1 error of the changed actions after the change, divided by the error at the change, (checks_after,).
+
+        The model is checked after every 50 transitions; `checks_after` is the number of these checks after the change.
+        """
         relative: Array = self.series[self.checks_before :, 0] / self.at_change
         return relative
 

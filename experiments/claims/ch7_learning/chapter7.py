@@ -111,7 +111,10 @@ def _drawn(name: str, place: Path) -> str:
 
 
 def _spent(place: Path, start: float) -> float:
-    """Return the minutes spent, with those of interrupted runs."""
+    """Return the run time of an experiment until now in minutes, including its earlier calls, such as interrupted ones.
+
+    `place`: folder of the experiment, in which the time of earlier calls is saved.  `start`: `time.monotonic()` [s] when this call began.
+    """
     before = read(place / _TIMES)["seconds"] if (place / _TIMES).exists() else 0.0
     return float(before + time.monotonic() - start) / 60.0
 

@@ -205,7 +205,10 @@ def findings(found: Cells) -> dict[str, Any]:
 
 
 def _with_prior(grouped: Groups, initial: str, number: Callable[[Run], float]) -> dict[float, list[float]]:
-    """Return a number of the runs with a prior, by discount."""
+    """Return a number of each run that started with the prior `initial`, as a list for each discount.
+
+    `initial`: the imagined outcomes before any try, "50-50" or "60-40".  `number`: function that computes the number from a run.
+    """
     return of_each({discount: grouped[initial, discount] for discount in DISCOUNTS}, number)
 
 
@@ -214,7 +217,7 @@ def _every(grouped: Groups) -> list[Run]:
 
 
 def _law_claim(source: str, text: str, published: str, rule: Callable[[Groups], Measured]) -> Claim:
-    """Return a claim that is judged under each law."""
+    """Return a claim that is judged separately under each control law in `LAWS` (variants of settle speed and cable force)."""
     return Claim(source, text, published, rule=rule, varies="law")
 
 

@@ -242,7 +242,10 @@ _WHERE = "paper 3.1, fig. 4; thesis 7.2.1, fig. 7.5"
 
 
 def _by_discount(rule: Callable[[Runs, Published], Measured], world: str, published: Published) -> Measured | None:
-    """Judge the curious agent by a rule with each discount that was run."""
+    """Judge the curious agent by a rule, separately for each discount for which there are runs in this world.
+
+    Returns text and outcomes as `in_settings` does, or None if no discount has runs.  `published`: the runs by (world, agent).
+    """
     agents = {f"{discount:g}": _agent("curious", discount) for discount in (DISCOUNT, *OTHER_DISCOUNTS)}
     known = {text: published[world, agent] for text, agent in agents.items() if (world, agent) in published}
     return in_settings("discount", lambda runs: rule(runs, published), known)
@@ -373,7 +376,10 @@ def plot(found: Cells) -> Any:
 
 
 def _untried(axes: Any, group: Mapping[str, Runs]) -> None:
-    """Draw median and range over the seeds; the axis ends shortly after the least-tried agent, before the random one."""
+    """Draw how many state-actions are still untried after each number of transitions: the median and the range over the seeds.
+
+    The axis ends shortly after the slower of the least-tried and the curious agent; the random agent may need more transitions.
+    """
     ends = [covered(group[name]) for name in ("least_tried", "curious") if name in group]
     last = 1.15 * max((float(end.max()) for end in ends), default=1000.0)
     times = np.linspace(0.0, last, 600)

@@ -184,7 +184,11 @@ def _early_reward(run: Explored) -> float:
 
 
 def _apart(kind: str, grouped: Groups) -> Measured:
-    """Judge the computed numbers of tries, in the arm's space."""
+    """Judge whether the reward by "Kail" prefers an action of this kind to a reliable one after fewer tries than plain KL does.
+
+    The numbers of tries are simulated by `tries_to_prefer` with the states of the left arm; the runs are not used.  `kind`: "failing" or
+    "uncertain".
+    """
     kail, plain = (tries_to_prefer("left_arm", divergence, kind) for divergence in DIVERGENCES)
     texts = [f"{count:.1f}" if np.isfinite(count) else "never" for count in (kail, plain)]
     return f"tries with 'Kail' {texts[0]}, with plain KL {texts[1]}", kail < plain

@@ -396,7 +396,7 @@ def plot(found: Cells) -> Any:
 
 
 def _drawn_row(variant: str, row: Row) -> list[tuple[str, str]]:
-    """Return texts and colours of a row."""
+    """Return the cells of one row of the drawn table as (text, background colour), in the order of HEADER: the variant, then its numbers."""
     return [
         (variant, _color(row.both)),
         (f"{row.never:.1f} of {len(NEVER)}", _color(row.never == len(NEVER))),

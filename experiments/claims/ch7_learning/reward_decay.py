@@ -59,7 +59,11 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def _least(number: Any, digits: int, groups: Groups) -> Measured:
-    """Judge whether a number of the rewards at the end is lower for the curious agent than for the others."""
+    """Judge whether a number, such as the largest reward, is lower for the curious agent than for the other explorers.
+
+    `number`: function that computes it from the expected rewards of all actions at the end of a run, (actions,) nats.  `digits`: decimals
+    in the text.
+    """
     values = of_each(groups, lambda run: float(number(run["rewards"][-1])))
     return texts(values, digits), stands_below(values, "curious")
 

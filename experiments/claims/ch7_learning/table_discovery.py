@@ -372,7 +372,11 @@ def plot(found: Cells) -> Any:
 
 
 def _tries(axes: Any, pairs: list[tuple[Run, Run]], part: str) -> None:
-    """Draw the tries of every state-action, in the order of the states, at the table and at the ghost."""
+    """Draw how often each state-action of a part was tried, at the table and at its ghost (a table without forces).
+
+    The state-actions are in the order of their states; each number is the mean over the runs.  `pairs`: (run at the table, run at the
+    ghost).
+    """
     table, ghost = (np.mean([pair[which].tries[part].ravel() for pair in pairs], axis=0) for which in (0, 1))
     numbers = np.arange(len(table))
     axes.bar(numbers, table, width=1.0, color="C3", label="table")

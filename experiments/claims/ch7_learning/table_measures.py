@@ -89,7 +89,10 @@ def near_table(q: Array, arm: str, margin: float = NEAR_DISTANCE) -> NDArray[np.
 
 
 def low_goals(arm: str) -> NDArray[np.bool_]:
-    """Return in which states (81,) a field of the arm overlaps the table when the torso is bent forward (75 % of its pitch range)."""
+    """Return in which states (81,) the arm overlaps the table when the torso is bent forward (75 % of its pitch range).
+
+    The arm overlaps the table if one of its fields does; a field is a volume around a link that causes repulsive forces.
+    """
     space, pitch = arm_space(joints=JOINTS[arm]), robot().motor_index(TORSO[2])
     q = np.tile(robot().home, (len(space), 1))
     low, high = robot().limits[pitch]
@@ -351,11 +354,14 @@ def at_second_peak(ours: Array, theirs: Array) -> tuple[list[float], list[float]
 
 
 def is_cyclic(ours: Array, theirs: Array) -> bool | None:
-    """Return whether contact is cyclic: whether the autocorrelation has a second peak, above 0 and above that at the ghost.
+    """Return whether contact with the table is cyclic: whether the autocorrelation of the contact rate has a second peak.
 
-    `ours`, `theirs`: autocorrelations (runs, lags) at the table and at the ghost; at least two runs.  True if the interval of the runs'
-    values at the second peak is above 0 and above that at the ghost.  Otherwise the largest value of each run at lags of at least 3 windows
-    (of 50 transitions) is compared: None (undecided) if the interval of these values is above that at the ghost, else False.
+    `ours`, `theirs`: autocorrelations (runs, lags) at the table and at its ghost (a table without forces); at least two runs.  A lag is a
+    window of 50 transitions.
+
+    Two measures are compared by their confidence intervals over the runs.  The first is the value at the second peak (`at_second_peak`).
+    Returns True if its interval at the table is above 0 and above its interval at the ghost.  The second measure is the largest value at
+    lags of at least 3 windows.  If only its interval is above that at the ghost, returns None (undecided).  Otherwise returns False.
     """
     here, there = at_second_peak(ours, theirs)
     if interval(here)[0] > max(0.0, interval(there)[1]):

@@ -202,12 +202,15 @@ def runs_of(found: Cells) -> Runs:
 
 
 def findings(found: Cells) -> dict[str, Any]:
-    """Return the results as a dict of tables by lattice ("small", "stretched"), and a list with the judged claims under "claims".
+    """Return the results as a dict with five keys.
 
-    "lattices": a row of numbers, such as "states_never_reached" and "share_of_failed_actions".  "states never reached": the states, by the
-    share of the runs in which they were not reached.  "end states of deflected actions, times per run": for actions of the small lattice,
-    the states in which they ended, and how often per run.  "self-contacts": the result of `contacts_by_pair`.  If not both lattices were
-    run in full, all claims stay unmeasured and are not judged.
+    Three of them contain a dict from the lattice ("small", "stretched") to results.  "lattices": a row of numbers, such as
+    "states_never_reached" and "share_of_failed_actions".  "states never reached": a dict from a text like "in 3 of 5 runs" to the states
+    that were never reached in so many runs, as text.  "self-contacts": the result of `contacts_by_pair`.
+
+    "end states of deflected actions, times per run" is a dict from an action of the small lattice, "source->goal", to the states in which
+    it ended, with the mean number of times per run.  "claims" is a list of the claims with their verdicts, as dicts (`Claim.record`).  If
+    not both lattices were run in full, all claims stay unmeasured and are not judged.
     """
     runs = runs_of(found)
     whole = all(lattice in runs and len(runs[lattice][0].seen) == actions for lattice, actions in ACTIONS.items())

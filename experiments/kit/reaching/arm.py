@@ -130,7 +130,10 @@ def jacobians(law: str = "default") -> Array:
 
 
 def _poses(law: str) -> Array:
-    """Return the pose of the robot in each state, (S, n) rad, the other motors at home."""
+    """Return the pose of the robot in each state of `space(law)`, (S, n) rad; motors outside the lattice are in the home posture.
+
+    `law`: "default" with today's robot, or "published" with the robot of 2014.
+    """
     poses = np.tile(body(law).home, (len(space(law)), 1))
     poses[:, _motors(law)] = space(law).samples
     return poses

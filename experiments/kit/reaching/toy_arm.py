@@ -225,7 +225,10 @@ def blocked(target: Array) -> NDArray[np.bool_]:
 
 @cache
 def grid() -> list[ReachTarget]:
-    """Return 27 targets: three x, three y and three z, which are quantiles of the palm positions in random poses; z changes fastest."""
+    """Return 27 targets on a 3 x 3 x 3 grid, positions in m relative to the shoulder; z changes fastest, x slowest.
+
+    The three values of each coordinate are the 0.15, 0.5 and 0.85 quantiles of the palm's coordinate in 4000 random poses.
+    """
     low, high = _ranges().T
     reached = hands(np.random.default_rng(0).uniform(low, high, size=(4000, 4)))
     axes = np.quantile(reached, QUANTILES, axis=0).T
@@ -247,7 +250,11 @@ def _ranges() -> Array:
 
 @cache
 def _missing(place: bytes) -> Array:
-    """Return the remaining errors (S, STARTS) m of reaches from each state; the starts are the same for all targets."""
+    """Return the remaining errors (S, STARTS) m of reaches for a target, from STARTS (8) noisy start poses in each state.
+
+    A remaining error is the distance of the palm from the target after the reach.  `place`: position of the target relative to the
+    shoulder, (3,) m, as the bytes of the array (a key for the cache).  The start poses are the same for all targets.
+    """
     space = toy_space()
     noise = NOISE * np.random.default_rng(0).standard_normal((len(space), STARTS, 4))
     return missing(space.samples[:, None] + noise, np.frombuffer(place), _ranges())

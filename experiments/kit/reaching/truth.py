@@ -197,11 +197,12 @@ class Known:
 
 
 def oracle(truth: Truth, space: Space, plant: ReachPlant, beliefs: OutcomeModel, marker: str, scale: float, seed: int) -> ReachAgent:
-    """Return an agent that knows the true rewards and the blocked transitions; it is to be evaluated on the measured targets.
+    """Return an agent that knows the true rewards and the blocked transitions of the targets in `truth`.
 
-    `truth`: the measured results.  `marker`: name of the marker that reaches.  `seed`: of the agent.  `beliefs`: transition model without
-    targets.  `scale`: m, the remaining error for which the reward is 1/2 (thesis eq. 8.4).  A transition is regarded as blocked if at least
-    half of its tries failed.
+    It is to be evaluated on these targets only, not to learn.  `truth`: the measured results.  `space`, `plant`: the states and the plant
+    of the agent.  `beliefs`: the transition model of the world without targets, with which the agent plans.  `marker`: name of the marker
+    that reaches.  `scale`: m, the remaining error for which the reward is 1/2 (thesis eq. 8.4).  `seed`: of the agent.  A transition is
+    regarded as blocked if at least half of its tries failed.
     """
     known = Known(truth, scale)
     agent = ReachAgent(space, plant, beliefs, marker=marker, predictor=known, strategy="greedy", failures="local", scale=scale, seed=seed)

@@ -76,7 +76,11 @@ class RunLength:
         return self._decided()
 
     def _decided(self) -> int | None:
-        """Return the length of the new run, if there is one with a larger share; a new run becomes the one that is certain."""
+        """Return the number of outcomes in a new run in which a larger share of outcomes contradicts what was learned, else None.
+
+        A run is the time between two changes. It is new if it began after the last certain run, with a probability above 0.5, and its share
+        differs with a probability of at least CERTAIN (0.95). Then it becomes the certain run, also if its share is smaller.
+        """
         probability = self._weight.sum(axis=1)
         later = self._start > self._known
         if probability[later].sum() <= 0.5:
@@ -157,12 +161,12 @@ class WorldChanges:
         self._is_reach: list[bool] = []  # of all outcomes that the detector got
 
     def probabilities(self, step: Step, target: Array, goal: int) -> tuple[float, float] | None:
-        """Return the two arguments of `Detector.add` for a step (a transition or a reach), `learned` and `unknown`.
+        """Return how probable the result of a step (a transition or a reach) was: by what was learned, and without any knowledge.
 
-        For a transition they are the probabilities of what happened: that it ended in its goal, or that it did not. For a reach they are
-        densities of its reward. Call this before the learner learns from the step. None if a transition ended in contact with the target,
-        because the target may then have caused its outcome. `target`: (3,) m, root frame, position of the target. `goal`: the goal state of
-        a transition.
+        These are the arguments `learned` and `unknown` of `Detector.add`. For a transition they are the probabilities of what happened:
+        that it ended in its goal, or that it did not. For a reach they are densities of its reward. Call this before the learner learns
+        from the step. None if a transition ended in contact with the target, because the target may then have caused its outcome.
+        `target`: (3,) m, root frame, position of the target. `goal`: the goal state of a transition.
         """
         if step.a == REACH:
             variance = self._variance(step.s, target)
@@ -205,7 +209,10 @@ class WorldChanges:
         self._detector = self._make_detector()
 
     def _variance(self, state: int, target: Array) -> float | None:
-        """Return the variance of the reward to expect; None if it is unknown."""
+        """Return the variance of the reward of a reach from a state for a target (3,) m, around its expected reward.
+
+        It is None if the predictor has no deviations and no reach from this state for this target was recorded.
+        """
         try:
             deviation = float(self._predictor.deviation(target)[state])
         except InvalidValue:  # a predictor without deviations: only repeated reaches inform

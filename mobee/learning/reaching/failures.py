@@ -90,7 +90,11 @@ class AlikeFailures:
         return self.limited(target, MAX_COST)
 
     def limited(self, target: Array, max_cost: float) -> Array:
-        """Return the result of `rewards`, if a transition that is certain to fail by its similar ones has the reward -max_cost."""
+        """Return the result of `rewards`, (S, A), with `max_cost` in place of MAX_COST (0.4).
+
+        A transition that was not tried with this target, and whose similar transitions all failed, has a reward near -max_cost, at least
+        -max_cost. `target`: (3,) m, root frame.
+        """
         usual = self._failed / (self._used + 1.0)
         failed, weight = self._alike(target)
         more = (failed + PRIOR_WEIGHT * usual) / (weight + PRIOR_WEIGHT) - usual
@@ -275,7 +279,10 @@ class FailuresSinceChange:
         _core().gaussian_sums(self._middles, np.append(self._middles[transition], float(reward < 0.0))[None], self._sums)
 
     def _alike(self) -> Array:
-        """Return the rate of failures of similar transitions, shape (S A,)."""
+        """Return, for each transition, the rate at which similar transitions failed since the change, shape (S A,).
+
+        Index state * A + action belongs to this action of this state. Transitions are similar if their `midpoints` are near.
+        """
         (failed, weight), rate = self._sums, self._failed / (len(self._since) + 1.0)
         alike: Array = (failed + PRIOR_WEIGHT * rate) / (weight + PRIOR_WEIGHT)
         return alike

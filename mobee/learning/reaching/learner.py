@@ -231,7 +231,7 @@ class ReachLearner:
         return self.problems.targets[self._problem].position
 
     def _goal(self, step: Step) -> int:
-        """Return the state that a step should reach: that of its transition, or its own for a reach."""
+        """Return the state that the action of a step should lead to: the goal of a transition; for a reach, the state where it begins."""
         return step.s if step.a == REACH else self.space.goal(step.s, step.a)
 
     def _observe_transition(self, step: Step) -> None:

@@ -305,7 +305,10 @@ class _Trial:
             _, self.state = move(agent.plant, agent.space, self.state, action)
 
     def reach_for(self, target: ReachTarget, found: Evaluation, at: tuple[int, int]) -> None:
-        """Make one problem-try with the present expected rewards."""
+        """Make one problem-try (attempt to reach a target): move by a plan, then reach; nothing is learned about rewards.
+
+        The results are written to the arrays of `found`, at the indices `at`: (repetition, problem).
+        """
         agent, position = self.agent, target.position
         agent.plant.present(target)
         expected = np.maximum(agent.predictor.mean(position), 0.0)

@@ -81,8 +81,9 @@ def hands_of(space: Space, marker: str) -> Array:
 class ReachPlanning:
     """Computes the values of states and actions for plans that end in a reach.
 
-    For this, the object is an `OutcomeModel` of the space with two additions: each of the S states has one more action, the reach, after
-    the A transitions; the reach always leads to one more state, the end of the plan.
+    The method `values` gets the rewards and returns the values. It plans with the outcome probabilities of `beliefs` and two additions.
+    Each of the S states has one more action after its A transitions, the reach, with index A. The reach always leads to one more state,
+    the end of the plan, with index S. The object itself is the `OutcomeModel` with these additions.
 
     Args:
         space: states and transitions.
@@ -173,7 +174,11 @@ def plan_reach(space: Space, planning: ReachPlanning, expected: Array, failures:
 
 
 def _best_path(planning: ReachPlanning, start: int, values: Array, action_values: Array) -> tuple[list[int], list[int], list[float]]:
-    """Return states, actions and probabilities of following the best actions through their most probable outcomes of higher value."""
+    """Follow the best actions from `start` and return the states, the actions and the probability of each move.
+
+    From each state, the path leads to the most probable outcome among those of higher value. It ends where the best action is the reach, or
+    where no outcome has a higher value. The list of states has one element more than the other two.
+    """
     path, actions, chances = [start], list[int](), list[float]()
     best = action_values.argmax(axis=1)
     while best[path[-1]] != action_values.shape[1] - 1:

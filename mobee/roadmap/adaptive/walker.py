@@ -168,7 +168,7 @@ class Walker:
         return bool(np.abs(q[space.columns] - space.samples[vertex]).max() <= self.near)
 
     def _nearest(self, q: Array) -> list[int]:
-        """Return all vertices, the nearest first."""
+        """Return the numbers of all vertices, the nearest to q (n,) rad first, by the largest distance of a joint."""
         space = self.roadmap.space
         away = np.abs(space.samples - q[space.columns]).max(axis=1)
         return [int(vertex) for vertex in np.argsort(away, kind="stable")]

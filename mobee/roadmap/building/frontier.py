@@ -227,7 +227,10 @@ class Frontier:
         return free
 
     def _close_directions(self, point: Array, simplex: Array | None) -> None:
-        """Clear the directions of other vertices that a new vertex or its simplex occupies."""
+        """Mark as not free the directions of other vertices that end near the new vertex at `point` (m,), or inside its simplex.
+
+        A direction ends one spacing from its vertex. `simplex`: (m, m) inverse of the matrix of its edges; None if there is no simplex.
+        """
         near = np.flatnonzero((((self.points - point) ** 2).sum(axis=1) < (1.0 + MAX_NEIGHBOURS) ** 2) & self.free.any(axis=1))
         targets = self.points[near][:, None] + self.directions
         taken = ((targets - point) ** 2).sum(axis=-1) < MIN_DISTANCE**2

@@ -214,7 +214,12 @@ class FrontierBuilder:
         return self.problem.whole(np.minimum(self._low + postures * (self._high - self._low), self._high))
 
     def _spacing_cost(self, which: Ints, points: Array) -> tuple[Array, Flags]:
-        """Return the cost of eq. 3.6 and of the aims at points (k, population, m), and whether each keeps its distance to all vertices."""
+        """Return the cost of the distances of points from the map, and whether each point is neither too near to its vertices nor too far.
+
+        The cost grows with the difference between 1 spacing and the distance to each of the m nearest vertices (thesis eq. 3.6), and with
+        the distance from the aim of the search, if the setting `frontier` is on. `which`: numbers of k searches. `points`: (k, population,
+        m), in spacings. Both results have the shape (k, population).
+        """
         n = min(self.frontier.dimensions, len(self.frontier))
         squares = ((points[:, :, None] - self.scheduler.near[which, None]) ** 2).sum(axis=-1)
         nearest = np.sqrt(np.sort(np.partition(squares, n - 1, axis=-1)[..., :n], axis=-1))

@@ -112,7 +112,10 @@ def _lattice_edges(dimensions: int) -> Array:
 
 
 def _offsets(dimensions: int) -> Ints:
-    """Return the offsets, in half edges, to all points within an edge and some more; in many dimensions to lattice points only."""
+    """Return the offsets (k, m) from a point of the lattice to the points near it, in whole numbers of half basis vectors (edges).
+
+    They are all combinations of -2 to 2, without the point itself; above _MAX_DIMENSIONS they are only the neighbours along each edge.
+    """
     if dimensions > _MAX_DIMENSIONS:
         return np.concatenate([2 * np.eye(dimensions, dtype=np.intp), -2 * np.eye(dimensions, dtype=np.intp)])
     return np.array([offset for offset in product(range(-2, 3), repeat=dimensions) if any(offset)])
@@ -350,7 +353,11 @@ class LatticeBuilder:
         return True
 
     def _add_intermediate(self) -> bool:
-        """Schedule the intermediate points around points that contacts prevent; return whether there are new ones."""
+        """Schedule the points half-way between lattice points next to the failed ones; return whether there are new points.
+
+        Only failed points at which least squares has found a posture count: the posture exists, but violates a term of the cost, such as
+        contacts. A new point is only scheduled if no vertex is too near to it.
+        """
         known = self._table.intermediate
         failed = [point for point, one in self._table.failed.items() if np.isfinite(one.violation) and point not in known]
         found = False

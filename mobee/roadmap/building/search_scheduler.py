@@ -216,7 +216,10 @@ class SearchScheduler:
             self.vertex[number], self._patience[number] = FIRST, FIRST_PATIENCE * len(self._start)
 
     def _possible_aims(self, vertex: int) -> Array:
-        """Return the points that a search from a vertex may aim at, (k, m); without aims, the vertex's own point."""
+        """Return the points (k, m), in spacings, that a search from a vertex may try to reach; m: dimension of the task space.
+
+        They lie one spacing from the vertex, in its free directions. Without the setting `frontier` the only point is that of the vertex.
+        """
         here = self._frontier.points[vertex]
         around: Array = here + self._frontier.directions[self._frontier.free[vertex]] if self._settings.frontier else here[None]
         return around
@@ -243,7 +246,11 @@ class SearchScheduler:
         return True
 
     def _usual_patience(self) -> int:
-        """Return the generations after which a search fails, from the generations of recent successful searches."""
+        """Return the number of generations (iterations of NES, the evolution strategy) after which a search counts as failed.
+
+        It is the setting `patience` times the upper quartile of the generations of the last RECENT (200) successful searches, but has a
+        lower bound. With fewer than MIN_SUCCESSES (8) of them it is a fixed number times the number of motors.
+        """
         ages = self._ages.rows[-RECENT:]
         if len(ages) < MIN_SUCCESSES:
             return FIRST_PATIENCE * len(self._start)

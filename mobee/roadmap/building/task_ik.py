@@ -87,7 +87,10 @@ class TaskIK:
         return violations, costs
 
     def _reals(self, y: Array) -> Array:
-        """Return the numbers of the coordinates' aims, a row per task point, see `mobee.roadmap.ik.solve.aim_reals`."""
+        """Return the aims (residuals for least squares) that require the task coordinates y (N, m), as numbers for the compiled core.
+
+        Row k has the numbers for y[k], as `mobee.roadmap.ik.solve.aim_reals` orders them.
+        """
         columns = []
         for number, cache in enumerate(self._cache):
             values, which = np.unique(y[:, number], return_inverse=True)

@@ -207,7 +207,11 @@ class NES:
             self._follow(z)
 
     def _follow(self, z: Array) -> None:
-        """Update the step size by the path's length, the shape by the path and all samples, the worse ones scaled to average length."""
+        """Update the distribution of "full" or "separable" by the samples z (population, d), the lowest cost first.
+
+        The length of the evolution path (the weighted sum of recent steps of the mean) changes the step size `sigma`. The path and all
+        samples change the shape matrix; the samples with negative weights are scaled to the average length first.
+        """
         rates, d = self._rates, len(self.mean)
         positive = np.maximum(rates.weights, 0.0)
         step = positive @ z

@@ -107,7 +107,7 @@ def solve_ik(
 
 
 def _evolved(problem: Problem, rng: np.random.Generator, most: int) -> Array:
-    """Return the first pose found within all tolerances, or else the cheapest of all evaluated poses."""
+    """Return the first pose found within all tolerances, or else the cheapest of all evaluated poses; `most`: limit of evaluations."""
     start = problem.start[problem.free]
     costs, good = problem.evaluate(problem.start[None])
     if good[0] and problem.must:
@@ -126,7 +126,10 @@ def _evolved(problem: Problem, rng: np.random.Generator, most: int) -> Array:
 
 
 def _result(model: Model, problem: Problem, q: Array) -> IK:
-    """Return the result for q: the costs from an evaluation with solids only, as in the search, and all contacts."""
+    """Return the result of inverse kinematics for the posture q (n,) rad.
+
+    The residuals are computed as in the search, in which only solids are tested for contacts. The table of contacts has all contacts.
+    """
     pose = problem.model.evaluate(q[None])
     missing = {name: float(one.residual(pose)[0]) for name, one in problem.by_name.items()}
     reached = all(one.tolerance is None or missing[name] <= one.tolerance for name, one in problem.by_name.items())
@@ -235,7 +238,10 @@ def least_squares(problem: Problem, rng: np.random.Generator) -> Array | None:
 
 
 def _drawn(problem: Problem, rng: np.random.Generator, count: int, which: Flags) -> Array:
-    """Draw starts of the free motors (count, d), alternately around the start and anywhere; only of some motors (d,)."""
+    """Draw starting values of the d free motors for least squares, (count, d) rad: alternately near `problem.start` and in the whole range.
+
+    `which`: (d,) whether each motor is drawn; the others have their value of `problem.start`.
+    """
     low, high = problem.limits.T
     start = problem.start[problem.free]
     drawn = rng.uniform(low, high, (count, len(low)))
@@ -259,7 +265,10 @@ def _reals(aim: Aim, tolerance: float | None) -> Array:
 
 
 def _numbers(robot: Robot, aims: Sequence[Aim]) -> Ints:
-    """Return kind, links and motor of each aim, (K, 4)."""
+    """Return kind, first link, second link and motor of each of K aims (residuals of inverse kinematics), as integers (K, 4).
+
+    Raises InvalidValue if one of these numbers does not exist in this robot.
+    """
     found = [(aim.kind, aim.first_link, aim.second_link, aim.motor) for aim in aims]
     valid = len(KINDS), len(robot.links), len(robot.links), len(robot.motors)
     for one in found:

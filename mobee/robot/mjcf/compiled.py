@@ -203,7 +203,10 @@ def _unused(name: str, taken: set[str]) -> str:
 
 
 def _lines(spec: Any) -> dict[str, tuple[int, ...]]:
-    """Return the line of each element that the specification records, as its text "line 12" gives it."""
+    """Return the lines in the file of the elements of a MuJoCo specification (MjSpec), for each kind of element (such as "joint").
+
+    The index of a line is the element's id. MuJoCo notes the line in the text `info`, as "line 12"; 0: it does not note it.
+    """
     tables = {"body": spec.bodies, "joint": spec.joints, "geom": spec.geoms, "site": spec.sites, "key": spec.keys, "camera": spec.cameras}
     found = {}
     for kind, elements in tables.items():

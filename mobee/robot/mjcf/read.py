@@ -31,7 +31,11 @@ MOST_NAMED = 3  # elements that a warning lists
 
 @dataclass(slots=True, eq=False)
 class _Skeleton:
-    """The tree: bodies without joints of their own are merged into the links that carry them."""
+    """The links and joints of the robot as read from MuJoCo's model.
+
+    A body without joints of its own is merged into the link that carries it. `links`: names of the links. `link_of`: for each body of
+    MuJoCo the index of its link. `joints`: joints of the robot. `numbers`: for each of these the index of MuJoCo's joint.
+    """
 
     links: list[str]
     link_of: list[int]  # MuJoCo's body -> link of the robot
@@ -114,7 +118,11 @@ def _motors(compiled: Compiled, skeleton: _Skeleton, drives: dict[int, Drive], a
 def _shapes(
     compiled: Compiled, skeleton: _Skeleton, options: UrdfOptions, where: dict[tuple[str, str], str]
 ) -> tuple[list[Shape], list[str]]:
-    """Return solids and their fields, link by link, and the body that each is on."""
+    """Return the shapes in the order of their links, and for each shape the name of the MuJoCo body that owns it.
+
+    With `UrdfOptions.field`, each solid is followed by its field: a larger shape around it that causes repulsive forces. `where` receives
+    the place of each shape in the file, for messages.
+    """
     solids = sorted(read_solids(compiled, skeleton.link_of, options.meshes, options.corners), key=lambda one: one[0].link)
     taken: dict[str, int] = dict.fromkeys((solid.name for solid, _ in solids), 0)
     shapes: list[Shape] = []

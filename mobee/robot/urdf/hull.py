@@ -192,7 +192,11 @@ def _box(points: Array, frame: Array) -> Primitive:
 
 
 def _around(points: Array, axis: Array) -> tuple[Array, Array, float, Array, Array]:
-    """Return orientation, a point on the best axis, the radius, and for each point its distance from the axis and position along it."""
+    """Return the thinnest cylinder along the unit vector `axis` (3,) around points (v, 3) m, computed approximately.
+
+    The result is: a rotation (3, 3) that turns z into the axis, a point (3,) on the cylinder's axis, the radius [m], and for each point its
+    distance from this axis and its position along it, (v,) m each.
+    """
     rotation = align(Z, axis)
     local = points @ rotation
     middle = _centre(local[:, :2])

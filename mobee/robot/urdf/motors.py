@@ -171,7 +171,11 @@ def _limited(master: UrdfJoint, motor: Motor) -> Motor:
 
 
 def _extended(master: UrdfJoint, motor: Motor) -> Motor:
-    """Return the motor with the values that `write_urdf` adds because URDF has no element for them: name, unit, acceleration."""
+    """Return the motor with the values of the element <mobee> that `write_urdf` adds to the joint, since URDF has no place for them.
+
+    These are the motor's name, the scale and offset between motor and joint (joint = scale * motor + offset), and the acceleration limit. A
+    motor without this element is returned unchanged.
+    """
     note = child(master.node, "mobee")
     if note is None:
         return motor

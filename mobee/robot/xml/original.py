@@ -225,7 +225,10 @@ def _fixed(node: Node) -> Remark:
 
 
 def _named_again(node: Node, first: Node) -> list[Remark]:
-    """Return remarks on the attributes that a second element of a motor changes; these are ignored."""
+    """Return a remark on the attributes in which a second <motor> of the same name differs from the first; they are ignored.
+
+    The list is empty if there is no difference. Compared are the limits, the home and the index.
+    """
     vain = [
         name
         for name in ("minPos", "maxPos", "home", "idx")
@@ -255,14 +258,14 @@ def _limits(node: Node) -> list[Remark]:
 
 
 def _dissolve(root: Node, elements: set[int]) -> None:
-    """Replace some elements by the elements inside them."""
+    """Replace some elements of the tree below the root by their children; `elements`: the Python ids, id(node), of these elements."""
     for node in list(descendants(root)):
         while any(id(child) in elements for child in node.children):
             node.children = [inner for child in node.children for inner in (child.children if id(child) in elements else [child])]
 
 
 def _rewrite_constraints(root: Node) -> list[Remark]:
-    """Remove the rows that the program of 2014 ignored, and the lists without a row."""
+    """Remove each <constraint> and <constraintList> that the published program of 2014 (MoBeE) ignored; return a remark on each."""
     remarks: list[Remark] = []
     waiting: list[tuple[Node, bool]] = [(root, False)]
     while waiting:
@@ -281,7 +284,10 @@ def _rewrite_constraints(root: Node) -> list[Remark]:
 
 
 def _ignored_constraint(node: Node, parent: Node, in_part: bool) -> Remark | None:
-    """Return a remark with the reason why the program of 2014 ignored a row or a list; None if it did not ignore it."""
+    """Return a remark with the reason why the program of 2014 (MoBeE) ignored a <constraint> or <constraintList>; None if it did not.
+
+    `parent`: the element that contains it. `in_part`: whether it is inside a <bodypart>.
+    """
     if node.tag == "constraintlist":
         if not in_part:
             return Remark(node, "<constraintList> outside of every part is ignored, as by the program of 2014", "Move it into a <bodypart>")
@@ -298,7 +304,11 @@ def _ignored_constraint(node: Node, parent: Node, in_part: bool) -> Remark | Non
 
 
 def _has_row(node: Node) -> bool:
-    """Return whether a <constraint> has as many factors as motors, and a number b."""
+    """Return whether a <constraint> is a valid row: an inequality a.q + b > 0 of motor positions q.
+
+    It is valid if its attribute `a` lists as many factors as its attribute `q` lists motors, at least one, and its attribute `b` is a
+    number.
+    """
     a, q = (node.attributes.get(name, "").split(" ") for name in ("a", "q"))
     try:
         float(node.attributes.get("b", ""))
@@ -361,7 +371,10 @@ def free_name(name: str, taken: dict[str, Node] | Counter[str]) -> str:
 
 
 def _mark_base(root: Node) -> None:
-    """Write into every link and joint whether it belonged to the robot's base in the program of 2014."""
+    """Mark the links and joints that belong to the robot's base; MoBeE of 2014 did not test the base for contacts with the world.
+
+    See `near_root`. The attribute `base` is written only where the value differs from the one that the element inherits.
+    """
     parents: list[int] = []
     tags: list[str] = []
     elements: list[Node] = []

@@ -22,7 +22,11 @@ IGNORE_ATTRIBUTES = frozenset({"first", "second", "of", "part", "role", "reason"
 
 @dataclass(slots=True)
 class _Ignored:
-    """The pairs in the <ignore> tags of one role."""
+    """The content of the <ignore> elements of one role: what is not tested for contacts among solids, among fields, or both.
+
+    `links`: pairs of links, each with the reason. `shapes`: pairs of indices of shapes. `parts`: names of parts whose shapes are not tested
+    with each other.
+    """
 
     links: dict[LinkPair, str] = field(default_factory=dict)  # and why
     shapes: set[frozenset[int]] = field(default_factory=set)

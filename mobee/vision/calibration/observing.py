@@ -71,7 +71,12 @@ def choose_postures(rig: Rig, model: Model, settings: CameraSettings, part: str,
 
 
 def _search(rig: Rig, model: Model, settings: CameraSettings, free: Ints, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Return postures (K, n) that fit, and numbers (K, f) by which they are distinguished: random ones first, then others about them."""
+    """Return suitable postures (K, n) rad for the calibration, and features (K, f) by which different postures are selected from them.
+
+    `_fitting` decides which postures are suitable: the cameras see the tag and nothing touches. The postures are first drawn at random;
+    after FOUNDERS have been found, they are drawn near those. The features have no unit: positions of the head's motors, and the tag in the
+    pictures.
+    """
     home, low, span = rig.robot.home, rig.robot.limits[free, 0], np.ptp(rig.robot.limits[free], axis=1)
     kept, seen, later = np.empty((0, len(home))), list[Array](), 0
     for _ in range(FIRST + NEXT):
@@ -103,7 +108,12 @@ def _moves(rig: Rig, free: Ints) -> NDArray[np.bool_]:
 
 
 def _fitting(rig: Rig, model: Model, settings: CameraSettings, postures: Array) -> tuple[Ints, Array]:
-    """Return which postures (B, n) fit, and numbers (K, f) by which these are distinguished."""
+    """Return the indices (K,) of the suitable postures among `postures` (B, n) rad, and features (K, f) that describe what they show.
+
+    A posture is suitable if all cameras see the tag, at a permitted distance, not too oblique and not near the border of the picture.
+    Besides, no contacts are found and the constraints of the joints hold. The features, without a unit, are: positions of the head's motors
+    within their limits; for each camera the tag's position in the picture, its distance and the direction of its normal.
+    """
     assert rig.tag is not None
     robot = rig.robot
     low, high = robot.limits[list(rig.head)].T
@@ -140,7 +150,10 @@ def _spread(features: Array, count: int) -> Array:
 
 
 def _in_order(postures: Array) -> Array:
-    """Return the order of postures (K, d) in which each next one is the nearest of the rest."""
+    """Return the indices (K,) that order postures (K, d): the first posture first, then always the nearest of the others.
+
+    The distance of two postures is the largest difference of an angle.
+    """
     left, order = set(range(1, len(postures))), [0]
     while left:
         rest = np.array(sorted(left))

@@ -102,7 +102,11 @@ class JointOffsets:
         return True
 
     def _is_change(self, first: tuple[Array, Array], second: tuple[Array, Array]) -> bool:
-        """Count two improbable observations if changed offsets explain both; else leave the estimate as it was."""
+        """Return whether changed offsets explain two successive improbable observations (q, seen).
+
+        If they do, the estimate is updated with both; else it remains as it was. The covariance is widened for this test. The offsets
+        explain both if both observations are then probable, and no offset has changed by more than LARGEST_CHANGE.
+        """
         offsets, covariance = self.offsets, self.covariance
         self.covariance = covariance + UNKNOWN**2 * np.eye(len(offsets))
         self._update(*first)
@@ -127,7 +131,11 @@ class JointOffsets:
         return float((seen - place) @ np.linalg.solve(spread, seen - place))
 
     def _update(self, q: Array, seen: Array) -> None:
-        """Count an observation, linearised repeatedly, each time at the newest estimate (iterated extended Kalman filter)."""
+        """Update the estimate and its covariance with an observation, by an iterated extended Kalman filter.
+
+        The prediction is linearised ITERATIONS times, each time at the newest estimate. `q`: encoder values (n,) rad. `seen`: position (3,)
+        m of the marker, root frame.
+        """
         before, estimate = self.offsets, self.offsets
         for _ in range(ITERATIONS):
             place, jacobian = self._predicted_place(q, estimate)

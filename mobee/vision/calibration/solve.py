@@ -31,7 +31,12 @@ NAMED = 0.25  # weight in a direction above which a parameter is named
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Problem:
-    """Stacked observations: every picture has 8 rows for each camera, which are 0 where the camera did not see the tag."""
+    """The observations of a calibration, stacked: N moments at which the cameras took pictures of the tag.
+
+    A row is a coordinate of a corner in px: 8 rows for each camera; they are 0 where the camera did not see the tag. `q`: encoder values
+    (N, n) rad. `dq`: their velocities (N, n) rad/s. `variance`: their variances (N, n) rad^2. `corners`: (N, cameras, 4, 2) px, NaN where
+    the tag was not seen.
+    """
 
     rig: Rig
     tag: Tag
@@ -131,14 +136,21 @@ def calibrate(rig: Rig, observations: Sequence[Observation], settings: CameraSet
 
 
 class _Solver:
-    """Least squares in parameters that are scaled to a prior deviation of 1."""
+    """The least-squares problem of the calibration, in scaled parameters.
+
+    Each parameter is divided by its standard deviation before the measurement (prior), so that this deviation becomes 1.
+    """
 
     def __init__(self, problem: _Problem, scale: Array, noise: float, jitter: float) -> None:
         self._problem, self._scale, self._noise, self._jitter = problem, scale, noise, jitter
         self._roots: Array = np.empty(0)
 
     def __call__(self, start: Array) -> tuple[Array, Array]:
-        """Weight by the covariances at `start` (P,); return the solution (P,), and the scaled derivatives there with those of the prior."""
+        """Return the parameters (P,) that minimise the weighted errors, and the Jacobian (rows, P) there.
+
+        The weights are computed from the errors' covariances at `start` (P,). The Jacobian is by the parameters in units of their prior
+        deviation. Its rows include the weights of the robust loss; the last P rows are those of the prior.
+        """
         self._weigh(start)
         newest: list[tuple[Array, Array, Array]] = []
 

@@ -94,7 +94,10 @@ def by_color(things: Sequence[Thing]) -> Detector:
 
 
 def _likeness(pixels: NDArray[np.float32], color: Color) -> NDArray[np.float32]:
-    """Return how much of a colour is in each of some pixels (3, m): linear in the share of the pixel that has the colour; else 0."""
+    """Return for each pixel of `pixels` (3, m) how much of a colour it has, (m,): 0 if it is too pale or has another hue.
+
+    Else the value is proportional to the share of the pixel that has this colour.
+    """
     wanted = np.array(color, np.float32)
     chroma = wanted - wanted.mean()
     strength = float(np.linalg.norm(chroma))

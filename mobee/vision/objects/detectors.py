@@ -95,7 +95,12 @@ def sharpened(picture: Picture, shares: Floats) -> Floats:
 
 
 def _mixed(colors: Floats, own: Mask, anything: Mask) -> tuple[Floats, Mask]:
-    """Return the share (h, w) of a region in each pixel of a window with colours (h, w, 3), and where it is known."""
+    """Return the share (h, w) of each pixel that a region covers, 0 to 1, and where this is known (h, w), for pixels near its edge.
+
+    `colors`: (h, w, 3), a window of a picture. `own`: (h, w), pixels of the region. `anything`: pixels of all regions, this one included.
+    The colour of a pixel at the edge is a mixture of the mean colours inside and outside. The share is known where both means and a
+    sufficient contrast between them exist.
+    """
     whole, beyond = binary_erosion(own, SQUARE, border_value=1), ~binary_dilation(own, SQUARE, BAND)
     inside, enough_inside = _mean(colors, whole)
     outside, enough_outside = _mean(colors, beyond & ~anything)

@@ -226,7 +226,11 @@ def _half(thing: Thing) -> float:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Sights:
-    """The detections of one picture: optical centre (3,) m, rays (D, 3) through their middles, angles (D,) rad of discs of their areas."""
+    """The D detections in one picture, as rays from the camera.
+
+    `names`: of the things (D,). `origin`: optical centre (3,) m. `rays`: unit vectors (D, 3) through the middles of the detections, root
+    frame. `angles`: (D,) rad, the angle that each detection subtends, if it is a disc of the same area.
+    """
 
     names: NDArray[np.str_]
     origin: Array
@@ -241,7 +245,11 @@ class _Sights:
 
 
 def _pairs(thing: Thing, left: _Sights, right: _Sights) -> list[tuple[int, int]]:
-    """Return which detections of a thing may be the same one: their rays meet, where things of their areas may be."""
+    """Return the pairs (a, b) of detections, in the left and the right picture, that may show the same object of the kind `thing`.
+
+    a and b are indices in `left` and `right`. Both detections have the thing's name, and their rays pass each other at less than GAP. At
+    this place, in the range of the cameras, the area of each detection must mean a diameter between half and twice the usual one.
+    """
     base, cross = right.origin - left.origin, left.rays @ right.rays.T  # (A, B)
     one, other = (left.rays @ base)[:, None], right.rays @ base
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -289,7 +297,11 @@ def _in_range(eyes: Eyes, position: Array) -> bool:
 
 @dataclass(slots=True, eq=False)
 class _Guess:
-    """The unknowns: position (3,) m, logarithms of the lengths over the usual ones (g,), yaw [rad], and the errors of the cameras."""
+    """The unknowns that the fit of a thing to its outlines estimates.
+
+    `position`: (3,) m. `log_size`: (g,), logarithms of length / usual length, for each length of the shape. `yaw`: rad. `errors`: (c,),
+    errors of the camera poses and of the outlines, each divided by its standard deviation.
+    """
 
     position: Array
     log_size: Array
@@ -384,7 +396,7 @@ def _projected(eye: Eye, position: Array) -> Array:
 
 
 def _compared(thing: Thing, one: Outline, eyes: Eyes, number: int) -> Silhouette:
-    """Return what compares an outline in the picture of a camera, by its number, with silhouettes of the thing."""
+    """Return a Silhouette that compares one outline with the computed silhouettes of the thing; `number`: index of its camera in `eyes`."""
     mine, length_of = slice(6 * number, 6 * number + 6), [0, 0, 0]
     for length, axes in enumerate(SCALED[thing.kind]):
         for axis in axes:
@@ -395,9 +407,10 @@ def _compared(thing: Thing, one: Outline, eyes: Eyes, number: int) -> Silhouette
 
 
 def _rows(thing: Thing, seen: Sequence[Outline], compared: list[Silhouette], guess: _Guess) -> tuple[Array, Array, Array] | None:
-    """Return the residuals (m,) px of all points, positive outside the silhouette, their slopes (m, p), and whose they are (m,).
+    """Return the residuals (m,) px of the points of all outlines, their derivatives (m, p), and the index of each point's outline (m,).
 
-    None if the thing is not wholly ahead of a camera.
+    A residual is the distance of a point from the silhouette computed for `guess`, positive outside. The p unknowns are position, log
+    lengths, yaw (of a box only) and errors, in this order. None if the thing is not wholly ahead of a camera.
     """
     size, turn = np.array(thing.size) * np.exp(guess.log_size), upright(guess.yaw)
     rows = []

@@ -96,7 +96,11 @@ def touching(kind: Kind, size: Array, position: Array, rotation: Array, directio
 
 
 def _touching_sphere(radius: float, position: Array, directions: Array) -> tuple[Array, Array]:
-    """Return the same for a sphere: the plane through the camera with the normal (n, -h) touches it where n.x - h z = -r sqrt(1 + h^2)."""
+    """Return what `touching` returns, for a sphere of the given radius [m].
+
+    The plane through the camera with the normal (n, -h) touches the sphere where n.x - h z = -r sqrt(1 + h^2); n: a direction, x and z: the
+    position of the middle, r: the radius. h is the second value that is returned.
+    """
     a, z = directions @ position[:2], position[2]
     square = z * z - radius * radius
     h = (a * z + radius * np.sqrt(np.maximum(a * a + square, 0.0))) / square

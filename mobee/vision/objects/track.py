@@ -195,7 +195,11 @@ class Track:
         self.looks.append(False)
 
     def _predicted(self, t: float, turned: float, moving: bool) -> tuple[Array, Array]:
-        """Return the state (9,) and its covariance (9, 9) at time t [s]."""
+        """Return the predicted state (9,) and its covariance (9, 9) at time t [s]: position [m], velocity [m/s] and bias [m].
+
+        The bias is the error of seen positions that changes only with the gaze. `turned`: angle [rad] by which the gaze has rotated since
+        the last pictures. `moving`: predict for a moving object, else for one at rest.
+        """
         settings = self._settings
         dt, tau = max(0.0, t - self.t), settings.persistence
         same = float(np.exp(-abs(turned) / settings.turn))
@@ -220,7 +224,11 @@ class Track:
         return float(velocity @ np.linalg.solve(self._spread[V, V], velocity)) > self._settings.surprise
 
     def _average(self, placed: Placed) -> None:
-        """Average size and yaw; a box turned by quarters, with its sides exchanged, is the same box."""
+        """Average the size and yaw of a new seen position with the earlier ones, and store the averages in the track.
+
+        The new yaw has the weight 1 / n; n: number of seen positions so far, at most LOOKS. The sizes are weighted by their variances. A
+        box that is turned by 90 deg, with its sides exchanged, is the same box, so the description nearest to the average is used.
+        """
         size, yaw = placed.size, _yaw_of(placed.rotation)
         if self.thing.kind == "box":
             turns = int(np.round((self._yaw - yaw) / (0.5 * np.pi)))
@@ -288,7 +296,12 @@ class Tracker:
                 self._name(track)
 
     def _follow(self, thing: Thing, own: list[Track], places: list[Placed], t: float, turned: float) -> None:
-        """Give each place of a thing to the track to which it belongs, or to a new one."""
+        """Update each track of a kind of thing with the seen position that belongs to it; a position without a track starts a new one.
+
+        `own`: the tracks of this thing. `places`: seen positions, assigned to tracks such that the sum of the costs is the smallest. A
+        track without a position has missed it (`Track.miss`). `t`: time of the pictures [s]. `turned`: angle [rad] by which the gaze has
+        rotated since the last pictures.
+        """
         found: dict[tuple[int, int], tuple[Innovation, bool]] = {}
         costs: Array = np.full((len(own), len(places)), IMPOSSIBLE)
         for row, track in enumerate(own):
@@ -312,7 +325,11 @@ class Tracker:
         return possible >= self.settings.hits
 
     def _name(self, track: Track) -> None:
-        """Give a track the first free name of its thing, or that of the object that was not seen since before it; else none."""
+        """Give a track, which has no name yet, the first free name of its kind of thing ("ball", "ball_2", ...).
+
+        If no name is free, the track takes the name of another track and replaces it: the one whose last sight is the oldest, if this was
+        before the first sight of the new track. If there is no such track, the new one remains without a name.
+        """
         thing = track.thing.name
         names = [thing, *(f"{thing}_{number}" for number in range(2, self.settings.most + 1))]
         taken = {other.name: other for other in self._tracks if other.name and other.thing is track.thing}

@@ -85,7 +85,11 @@ class CartesianPrograms:
         return [(names[function], first, second) for function, first, second in nodes.tolist()]
 
     def _terms(self, genes: Ints, x: Array) -> Array:
-        """Return the values (N, 1 + TERMS) of a constant and of the outputs; only nodes on which an output depends are computed."""
+        """Return the values (N, 1 + TERMS) of the graph's outputs for N inputs x (N, d), after a first column of ones.
+
+        `genes`: the graph, that is, function and arguments of each node, then the node of each output. Only nodes on which an output
+        depends are computed.
+        """
         nodes, outputs = self._parts(genes)
         steps = self._steps(nodes)
         needed, open_ = set[int](), [int(one) for one in outputs if one >= self._inputs]

@@ -216,7 +216,10 @@ def _turned(rig: Rig, carried: Carried, postures: Array, limits: tuple[Array, Ar
 
 
 def _ranges(rig: Rig, share: float) -> tuple[Array, Array]:
-    """Return the ranges (n,), (n,) rad from which postures of the learner are drawn: of the torso a share about home."""
+    """Return the limits from which postures of the learner are drawn: lowest values (n,) rad, then highest values (n,) rad.
+
+    They are the motors' limits; but the torso has only a part, `share` (0 to 1), of the range on each side of its home posture.
+    """
     robot = rig.robot
     low, high = robot.limits.T.copy()
     torso = robot.part("torso").slice
@@ -226,7 +229,11 @@ def _ranges(rig: Rig, share: float) -> tuple[Array, Array]:
 
 
 def _seen(rig: Rig, transforms: Array, places: Array, size: tuple[int, int]) -> Array:
-    """Return whether all cameras, where the model has them, have places (B, 3) m in their pictures, at a fitting distance."""
+    """Return (B,) whether all cameras of the rig see the ball at the positions `places` (B, 3) m, root frame.
+
+    A camera sees it if it is in the picture (not within BORDER of its edge) and its distance is between 0.20 and 0.65 m (DISTANCES).
+    `transforms`: link poses of the B postures. The cameras are where the model has them. `size`: width and height of a picture [px].
+    """
     fits = np.ones(len(places), bool)
     for camera in rig.cameras.values():
         local = into(*camera_frames(camera, transforms, np.zeros(6)), places)

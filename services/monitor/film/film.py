@@ -110,7 +110,10 @@ def _write(pictures: Sequence[Any], file: Path) -> Path:
 
 
 def _write_gif(pictures: Sequence[Any], file: Path) -> None:
-    """One palette for all frames, without dither: what does not change between two frames takes no room."""
+    """Write pictures of Pillow, all of one size, as an animated GIF.
+
+    All frames share one palette and have no dithering, so regions that do not change between two frames add almost nothing to the file.
+    """
     from PIL import Image
 
     some = list(pictures)[:: max(1, len(pictures) // 12)]

@@ -66,7 +66,7 @@ class RobotView:
         return [self._tinted(one, agents).at(pose.transforms) for one in link_solids(self._robot)]
 
     def _tinted(self, one: LinkSolid, agents: Mapping[str, Any]) -> LinkSolid:
-        """Give a part that an agent moves something of the agent's colour."""
+        """Return a solid, mixed with the colour of the agent that moves its part; unchanged if there is none."""
         if one.part not in agents or one.part not in self._colors:
             return one
         hue = (channel / 255.0 for channel in self._colors[one.part])

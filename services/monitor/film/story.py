@@ -94,7 +94,7 @@ class StoryView:
 
 
 def _surprise(last: dict[str, Any]) -> str:
-    """Return how surprised the agent was, without how much it learned."""
+    """Return the text about the agent's surprise at its last action, without the clause about how much it learned."""
     text, comma, _ = str(last["surprise"]).partition(", learned")
     return text + "." * bool(comma)
 

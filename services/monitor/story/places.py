@@ -70,11 +70,13 @@ def base_link(robot: Robot, part: str) -> int:
 
 
 def places(space: Space, spot: Spot, q: Array) -> Array:
-    """Return the position of `spot` in each state, (S, 3) m, in the frame of the link on which the part is mounted.
+    """Return the position of `spot` in each of the S states of a part's state space, (S, 3) m.
 
-    This frame is the root frame at zero pose, and moves with the link.
+    The positions are in the frame of the link on which the part is mounted. This frame equals the root frame when all joints are at zero,
+    and moves with the link.
 
-    `q`: posture of the whole robot, (n,) rad; the part's own motors are replaced by the motor positions of each state.
+    `space`: the state space, which names its part. `q`: posture of the whole robot, (n,) rad; the part's own motors are replaced by the
+    motor positions of each state.
     """
     robot, part = space.robot, space.robot.part(space.part)
     base, pose = base_link(robot, space.part), q.copy()

@@ -67,7 +67,7 @@ class Teller:
     """
 
     def __init__(self, robot: Robot, colors: dict[str, Color]) -> None:
-        """Create empty stories; `colors`: colour of each part of the robot."""
+        """Create a teller that has no message of any agent yet; `colors`: colour of each part of the robot."""
         self._robot, self._colors = robot, colors
         self._agents: dict[str, _Agent] = {}
         self._playback: Playback | None = None
@@ -155,7 +155,7 @@ class Teller:
         return made
 
     def _drop_playback(self) -> None:
-        """The robot does something else: a path on which it has moved is shown no longer."""
+        """Remove the path of the last motion along a roadmap, unless this motion still runs. Called when the robot does something else."""
         if self._playback is not None and self._playback.phase != "moving":
             self._playback = None
             self.changed.add("path")

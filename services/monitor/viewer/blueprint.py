@@ -62,7 +62,7 @@ class Shown:
 
 
 def shown_of(robot: Robot, cameras: Sequence[str] = ()) -> Shown:
-    """Return what the 3D view shows of a robot and its cameras.
+    """Return the content of the 3D view for a robot and its cameras: title, parts, cameras and viewpoint.
 
     For the iCub the viewpoint is fixed, so that both robot and table are visible. For other robots it follows from their size.
     """

@@ -41,7 +41,10 @@ class ViewerFiles:
         return self._folder / name
 
     def _extract(self) -> None:
-        """Run the program's web server on loopback for a moment, without usage data and user settings, and copy its files."""
+        """Run the web server of the program Rerun on loopback for a moment, and copy the viewer's files from it to the folder.
+
+        The program runs without the user's settings and without sending usage data.
+        """
         private = {**os.environ, "RUST_LOG": "off", "XDG_CONFIG_HOME": str(self._folder), "XDG_DATA_HOME": str(self._folder)}
         subprocess.run([program(), "analytics", "disable"], env=private, capture_output=True, check=True, timeout=TIMEOUT)
         web, data = _free_ports()

@@ -52,9 +52,10 @@ class _Part:
 class Frames:
     """A stream that keeps data for open viewers, and also logs to `file` unless it is None.
 
-    An update is the data logged between `begin_update` and `end_update`: the robot's pose, and what changes with it. Only the newest update
-    is kept. It is made for viewers only if a viewer waits for it; the file gets every fourth update. All static data are kept. Of the
-    other data that are logged while a viewer is open, the newest 4 MB are kept.
+    It has three kinds of data. Static data have no time; all are kept. An update is the data logged between `begin_update` and
+    `end_update`: the robot's pose, and what changes with it. Only the newest update is kept; an update is kept only if a viewer waits for
+    it, and the file gets every fourth one. All other data are changes, such as events; the newest 4 MB that were logged while a viewer was
+    open are kept.
     """
 
     def __init__(self, file: rr.RecordingStream | None, layout: rrb.Blueprint, recording_id: str) -> None:

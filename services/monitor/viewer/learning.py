@@ -108,7 +108,11 @@ class Learning:
         self._stream.log(path, rr.Points2D(drawn.places, radii=radii, colors=colors))
 
     def _log_surprises(self, path: str, drawn: Drawn, found: list[tuple[int, int, int, float]]) -> None:
-        """Log the surprises in one colour per state-action, as in the paper's figure 7; the width is the probability."""
+        """Log the surprises (outcomes of an action in another state than its goal) as arrows, in one colour per state-action.
+
+        `found`: state, action, next state and probability of each, all by number; the width of the arrow grows with the probability. The
+        picture follows figure 7 of the article in Frontiers in Neurorobotics 7:25 (2014).
+        """
         colors = [(*palette.JOINTS[(7 * s + a) % len(palette.JOINTS)], 255) for s, a, _, _ in found]
         widths = [MIN_WIDTH + (MAX_WIDTH - MIN_WIDTH) * share for *_, share in found]
         states, ends = (np.array([one[k] for one in found], dtype=np.intp) for k in (0, 2))

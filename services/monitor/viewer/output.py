@@ -87,9 +87,10 @@ class Output:
 
 @contextmanager
 def open_output(config: Config, robot: Robot, now: Callable[[], float]) -> Iterator[Output]:
-    """Open the outputs of the monitor: the page if `config.serve` is set, and a recording if `config.run_dir` is set.
+    """Open the outputs of the monitor, as a context manager that closes them at the end of the `with` block.
 
-    `now`: returns the robot's time [s]. Exits with code 2 and one line on standard error if the port is in use, or `run_dir` is no folder.
+    The outputs are the page if `config.serve` is set, and a recording if `config.run_dir` is set. `now`: returns the robot's time [s].
+    Prints one line on standard error and raises SystemExit with code 2 if the port is in use, or `run_dir` is no folder.
     """
     folder, layout = _folder_of(config), blueprint(shown_of(robot, list(config.cameras_on(robot))))
     with tempfile.TemporaryDirectory(prefix="mobee-page-", ignore_cleanup_errors=True) as private:
@@ -142,7 +143,8 @@ def serve(site: Site, bind: str, port: int) -> PageServer:
     """Serve a page at an address and port, and return its server.
 
     `bind`: address of the network interface, as "127.0.0.1". If the port is in use, the call tries again for 1 s, because a program that
-    has just ended may still occupy it; then it exits with code 2 and one line on standard error.
+    has just ended may still occupy it. If the port is still in use then, the call prints one line on standard error and raises SystemExit
+    with code 2.
     """
     give_up = time.monotonic() + 1.0
     while True:

@@ -108,7 +108,11 @@ def _convex(solid: Solid) -> Made:
 
 
 def _turned(profile: Array, normals: Array) -> Made:
-    """Turn a profile (p, 2), radii and heights from below, about the z axis; `normals`: (p, 2), of the profile."""
+    """Return the surface of revolution of a profile about the z axis: vertices, normals and triangles.
+
+    `profile`: (p, 2), radius and height of each point [m], in order from the lowest. `normals`: (p, 2), outward normals there,
+    as radial and vertical components.
+    """
     angles = np.linspace(0.0, 2.0 * np.pi, ROUND + 1)
     cosine, sine = np.cos(angles)[:, None], np.sin(angles)[:, None]
 

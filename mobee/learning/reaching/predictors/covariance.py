@@ -85,7 +85,10 @@ class Covariance:
         return float(OFFSET + self._value[[_PLACE, _APPROACH, _DISTANCE]].sum())
 
     def between(self, a: Points, b: Points) -> Array:
-        """Return the covariances of the mean rewards of n reaches `a` and m reaches `b`, shape (n, m)."""
+        """Return the covariances of the mean rewards of n reaches `a` and m reaches `b`, shape (n, m).
+
+        `a`, `b`: features of the reaches, such as their states and targets, from the function `points`.
+        """
         pair = np.ix_(a.state, b.state)
         place = self._by_place[pair] * np.exp(_squared(a.target, b.target) * (-0.5 / self._value[_PLACE_L] ** 2))
         approach = self._by_approach[pair] * np.exp(_squared(a.vector, b.vector) * (-0.5 / self._value[_APPROACH_L] ** 2))
@@ -109,7 +112,7 @@ class Covariance:
         joints = [squares[pair] / length**2 for squares, length in zip(self._squares, value[_JOINTS:], strict=True)]
 
         def slopes(weights: Array) -> Array:
-            """Return the derivatives of the sum of weights (n, n) times the covariance by the logarithms of the parameters."""
+            """Return the derivatives (8 + d,) of sum(weights * covariance) by the logarithms of the parameters; `weights`: (n, n)."""
             noise = (weights.diagonal() / count).sum() * value[_NOISE]
             weights = weights * scales
             by_place, by_approach, by_distance = weights * place, weights * approach, weights * distance

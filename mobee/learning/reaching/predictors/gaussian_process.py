@@ -121,7 +121,7 @@ class Posterior:
         return max(1, int(MAX_CACHE // (8 * states * (len(self._score) + 2 * states))))
 
     def _updated(self, target: Array) -> Query:
-        """Return the query of a target with all rows computed."""
+        """Return the cached `Query` of a target (3,) m, root frame; first compute its missing rows (one for each reach)."""
         key = target.tobytes()
         known = self._queries.pop(key, None)
         if known is None:
@@ -141,7 +141,10 @@ class Posterior:
         return known
 
     def _continued(self, known: Query, first: int, end: int) -> tuple[Array, Array]:
-        """Compute the rows `first` to `end` of a target; returns mean and covariance with them."""
+        """Compute the rows `first` to `end` - 1 of a query (one for each reach, see `Query`).
+
+        Returns the posterior mean (S,), as a difference from the prior mean, and covariance (S, S), given the reaches 0 to `end` - 1.
+        """
         new = slice(first, end)
         seen = points(self._arm, self._state[new], self._target[new])
         rows = self._covariance.between(seen, known.at)
@@ -239,7 +242,10 @@ class GaussianProcess:
         return drawn
 
     def _about(self, target: Array) -> tuple[Array, Array]:
-        """Return the posterior of a target given all reaches; pending ones are added only now, since a long record rarely needs them."""
+        """Return the posterior of a target (3,) m, given all reaches, as `Posterior.about` returns it: mean (S,) and covariance (S, S).
+
+        Reaches that were added since the last call are included in the posterior only now, to save computing time.
+        """
         for state, place, residual in self._pending:
             self._posterior.append(state, place, residual)
         self._pending.clear()

@@ -150,7 +150,11 @@ class Kernel(Independent):
             self._refit()
 
     def _posterior(self, target: Array) -> tuple[Array, Array]:
-        """See Independent; the deviation is that of mean rewards from the prior, reduced by the weight of near reaches."""
+        """Return means and standard deviations, each (S,), as `Independent` defines them.
+
+        The deviation is the typical difference of mean rewards from the prior mean; the weight of reaches with similar poses and targets
+        makes it smaller.
+        """
         known, (by_joints, by_place) = self._reached, self._scales
         near = np.exp(-0.5 * ((known.places - target) ** 2).sum(axis=1) / by_place**2)[known.target] * known.count
         residual = known.mean - self._at_places(known)
@@ -160,7 +164,7 @@ class Kernel(Independent):
         return expected + total / (weight + PRIOR_WEIGHT), self._spread * np.sqrt(PRIOR_WEIGHT / (weight + PRIOR_WEIGHT))
 
     def _refit(self) -> None:
-        """Fit the prior and choose the scales."""
+        """Fit the prior mean and deviation, and choose the widths of the two kernels."""
         known = self._reached
         self._next = known.tries * REFIT
         self._middle, variance = around(known)
@@ -172,7 +176,7 @@ class Kernel(Independent):
             self._scales = self._best(residual)
 
     def _at_places(self, known: Reached) -> Array:
-        """Return the prior reward of each pair, shape (n,)."""
+        """Return the prior reward of each observed pair (state, target) of `known`, shape (n,)."""
         if not self._prior:
             return np.full(len(known), self._middle)
         for place in known.places[self._at_place.shape[1] :]:
@@ -180,7 +184,12 @@ class Kernel(Independent):
         return self._at_place[known.state, known.target]
 
     def _best(self, residual: Array) -> tuple[float, float]:
-        """Return the scales with the least squared error of reaches, each predicted from all others."""
+        """Return the widths of the two Gaussian kernels, over poses and over targets [m], that predict the observed rewards best.
+
+        All combinations of JOINTS and PLACES are compared by their squared error, when the mean reward of each pair (state, target) is
+        predicted without one of its own reaches; at most MAX_LEFT_OUT pairs are predicted. `residual`: (n,), mean reward of each pair minus
+        its prior reward.
+        """
         known = self._reached
         chosen = np.unique(np.linspace(0, len(known) - 1, min(len(known), MAX_LEFT_OUT)).round().astype(np.intp))
         far = ((known.places[known.target[chosen], None] - known.places) ** 2).sum(axis=-1)
@@ -217,7 +226,10 @@ class Nearest(Independent):
         return {"name": "nearest"}
 
     def _posterior(self, target: Array) -> tuple[Array, Array]:
-        """See Independent; the deviation is that of all mean rewards, and smaller for nearer neighbours."""
+        """Return means and standard deviations, each (S,), as `Independent` defines them.
+
+        The deviation of a state far from all reaches is that of the mean rewards of all pairs; nearer neighbours make it smaller.
+        """
         middle, variance = around(self._reached)
         far, which = self._neighbours(target)
         weight = 1.0 / (far + HALF_WEIGHT)
@@ -228,7 +240,11 @@ class Nearest(Independent):
         return mean, deviation
 
     def _neighbours(self, target: Array) -> tuple[Array, Ints]:
-        """Return squared distances, ascending, and pairs of each state's nearest reaches, shape (S, 5); infinite if there are fewer."""
+        """Return the squared distances of the five nearest reaches of each state, nearest first, and their numbers, each (S, 5).
+
+        The number of a reach is the index of its pair (state, target). If there are fewer than five, the distances are infinite, and the
+        numbers -1.
+        """
         key = target.tobytes()
         none = np.full((len(self._reaches), NEIGHBOURS), np.inf), np.full((len(self._reaches), NEIGHBOURS), -1)
         seen, far, which = self._found.pop(key, (0, *none))

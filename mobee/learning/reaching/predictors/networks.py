@@ -94,7 +94,7 @@ class Networks:
         return np.concatenate([self._joints, place, vector, length], axis=1)
 
     def _each(self, target: Array) -> Array:
-        """Return the predictions of all networks, shape (networks, S)."""
+        """Return the reward of a reach from each state for a target (3,) m, root frame, as each network predicts it: (networks, S)."""
         key = target.tobytes()
         if self._last[:2] != (key, self._tries):
             self._last = key, self._tries, layers(self._weights, self._biases, self._features(target))[-1][..., 0]

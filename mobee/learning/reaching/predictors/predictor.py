@@ -85,9 +85,10 @@ def begin_world(predictor: RewardPredictor) -> None:
 
 
 class Independent(ABC):
-    """Base of predictors for which the mean rewards of the states are independent normal variables.
+    """Base of predictors for which the mean rewards of reaches from different states are independent normal variables.
 
-    A subclass computes their means and standard deviations, in `_posterior`, from the reaches in `_reached`.
+    A subclass defines `_posterior`, which returns the means and standard deviations of these variables for a given target, each (S,). It
+    computes them from `_reached` (a `Reached`), where `add` records all observed reaches.
     """
 
     def __init__(self) -> None:
@@ -250,6 +251,6 @@ def lengths(reaches: Reaches, target: Array) -> Array:
 
 
 def _shares(far: Array) -> Array:
-    """Return the interpolation weights of the knots at each distance, shape (n, knots)."""
+    """Return the weights of the KNOTS (fixed distances) in a linear interpolation at each distance [m] of `far`, shape (n, knots)."""
     shares: Array = np.stack([np.interp(far, KNOTS, one) for one in np.eye(len(KNOTS))], axis=-1).reshape(-1, len(KNOTS))
     return shares

@@ -156,7 +156,10 @@ def load_network(path: str | Path) -> Network:
 
 
 def _thing(plain: dict[str, Any]) -> Thing:
-    """Return a thing as the metadata have it; raises KeyError, TypeError, ValueError."""
+    """Return the thing that is described in the metadata of a network's file.
+
+    Raises KeyError, TypeError or ValueError if the description is not valid.
+    """
     if plain["kind"] not in KINDS:
         raise ValueError(plain["kind"])
     red, green, blue = map(float, plain["color"])

@@ -110,7 +110,11 @@ def held_out(robot: Robot, world: World, things: Sequence[Thing], pictures: int,
 
 
 def _chosen(shares: Floats, rng: np.random.Generator) -> Ints:
-    """Return the pixels of a picture from which it learns, as row * width + column: some at edges, some inside things, some outside."""
+    """Return the pixels of a picture that are used for training, as indices row * width + column.
+
+    They are drawn at random: up to EDGE at the edges of each thing and up to INSIDE in its interior, and up to OUTSIDE elsewhere. `shares`:
+    (H, W, N), the share of each pixel that each of N things covers.
+    """
     anything = np.zeros(shares.shape[:2], np.bool_)
     found = []
     for number in range(shares.shape[2]):
@@ -227,7 +231,11 @@ def _posture(robot: Robot, rng: np.random.Generator) -> Array:
 def _places(
     world: World, things: Sequence[Thing], frame: tuple[Array, Array], rng: np.random.Generator
 ) -> Mapping[str, tuple[Array, bool]]:
-    """Return a place (3,) m of each thing ahead of a camera, on the top of a box of the world if it would be below, and whether it was."""
+    """Return for each thing, by its name, a random position (3,) m in front of a camera, and whether it was lifted onto a box.
+
+    If the position is inside, below or too closely above a box (obstacle) of the world, the thing is lifted to stand on the box. `frame`:
+    the camera's position (3,) m and rotation (3, 3), root frame.
+    """
     position, rotation = frame
     found = {}
     for thing in things:
