@@ -143,6 +143,8 @@ class Model:
         and InvalidValue if q has another length or is not finite.
         """
         pose = self.evaluate(q)
+        if pose.q.ndim != 1:
+            raise InvalidValue(f"q has shape {pose.q.shape}; an object is attached at one pose, ({self._motors},) rad.")
         carrier = link_pose(pose, link)
         if name not in pose.objects:
             raise UnknownName("world object", name, pose.objects)

@@ -166,6 +166,12 @@ def test_attach_in_a_given_pose_does_not_need_the_one_that_the_world_follows(mod
     assert model.evaluate(STRETCHED).objects["cup"].position == pytest.approx([TIP, 0.0, 0.0], abs=1e-15)
 
 
+def test_an_object_is_not_attached_at_a_batch_of_poses(model):
+    model.world.add("cup", mobee.sphere(0.04))
+    with pytest.raises(mobee.InvalidValue, match=r"q has shape \(2, 3\); an object is attached at one pose, \(3,\) rad"):
+        model.attach("cup", "link3", [FOLDED, STRETCHED])
+
+
 def test_attach_names_the_nearest_link_and_object(model):
     model.world.add("cup", mobee.sphere(0.04))
     model.world.follow(model.evaluate(STRETCHED))
