@@ -115,7 +115,7 @@ class AddObject(Request, frozen=True, kw_only=True):
 
 
 class MoveObject(Request, frozen=True, kw_only=True):
-    """Set the pose of an object of the world of the service `model`."""
+    """Set the position of an object of the world of the service `model`, and its orientation if `quaternion` is given; root frame."""
 
     name: Name
     position: Vector3  # m, root frame
@@ -249,7 +249,7 @@ class Config(Reply, frozen=True, kw_only=True):
 
 
 class Failure(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The reply to a call that was refused."""
+    """The reply to a call that was refused or that failed; `code` is the reason as a word such as "owned", listed in docs/bus.md."""
 
     v: int  # version of the contract
     code: Name  # short code of the reason, see docs/bus.md

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Build the native core: one shared library for each level of x86-64 processors, one in all elsewhere.
+"""Build the native core: a shared library for each level (set of features) of x86-64 processors on Linux, a single one on other machines.
 
     python core/build.py [--only x86-64-v3 | --here] [--into FOLDER] [--sanitize] [--no-strict] [--force] [--check]
 
-The compiler is $CXX, else the system's g++ or clang++ where it knows C++20, else that of the `ziglang` package.  Nothing is linked
-but the C library, so that the result runs wherever the C library is at least as old.  A library that was built from the same
-sources stays as it is.
+The compiler is the one that $CXX names. If it is not set, it is the first of g++, clang++ and the one of the package `ziglang` that is
+installed and compiles C++20. A library needs no other library than the C library, so it runs on every system with a C library that is not
+older. A library that was built from the same sources is not built again.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class BuildFailed(Exception):
 
 
 class CompilerMissing(BuildFailed):
-    """Nothing here compiles C++20."""
+    """Raised if this machine has no compiler of C++20: neither g++, clang++ nor the package ziglang."""
 
     def __init__(self) -> None:
         super().__init__(
@@ -65,19 +65,26 @@ class CompilerMissing(BuildFailed):
 
 @dataclass(frozen=True)
 class Compiler:
-    """How to call a compiler, and whether it is zig, of which only the compiler proper is used."""
+    """A compiler: `command` is the program with its first arguments; `zig` is whether it is the one of the package ziglang.
+
+    Of zig only the compiler and the linker are used: it would compile its runtime and its C library from source, which takes minutes.
+    """
 
     command: tuple[str, ...]
     zig: bool = False
 
     @property
     def name(self) -> str:
-        """What a person calls it."""
+        """Short name of the compiler for messages to the user: "zig", or the file name of its command, such as "g++"."""
         return "zig" if self.zig else Path(self.command[0]).name
 
 
 def main() -> None:
-    """Build what is asked for; ends with one line if that cannot be done."""
+    """Build the libraries of the core that the options name and that are not current; all levels of this machine without an option.
+
+    If that fails, one line says why, and the exit code is not 0. With --check nothing is built; the exit code is 1 if a library is not
+    current.
+    """
     levels = knowledge().machine_levels()
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("--only", choices=levels, help="one level instead of all")
@@ -107,12 +114,19 @@ def main() -> None:
 
 
 def level_here() -> list[str]:
-    """The widest level that this processor runs; none, where it is too old for all, which the library says when it is loaded."""
+    """Return a list with the name of the highest level (set of processor features) that this processor can run, such as "x86-64-v3".
+
+    The list is empty if the processor is too old for all levels; the library then raises CoreUnavailable when it loads its core.
+    """
     return list(knowledge().possible_levels(knowledge().processor_flags())[-1:])
 
 
 def build(levels: Sequence[str], compiler: Compiler, into: Path, strict: bool) -> Iterator[Path]:
-    """Build levels, all processors at work, and give each file when it is there; raises BuildFailed."""
+    """Build the core for each of the levels, several at a time, and yield the path of each library file when it is finished.
+
+    `levels`: names of builds, such as "x86-64-v3" (a set of processor features). `into`: folder of the library files. `strict`: whether
+    warnings of the compiler are errors. Raises BuildFailed if a build fails.
+    """
     into.mkdir(parents=True, exist_ok=True)
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         made = [pool.submit(_build_one, compiler, level, into, strict) for level in levels]
@@ -125,7 +139,10 @@ def build(levels: Sequence[str], compiler: Compiler, into: Path, strict: bool) -
 
 
 def is_current(level: str, into: Path, strict: bool) -> bool:
-    """Whether a library was built from the sources as they are, without warnings if `strict`."""
+    """Return whether the folder `into` has a library file of this level that was built from the present sources.
+
+    `level`: name of the build, such as "x86-64-v3". `strict`: require also that it was built with warnings of the compiler as errors.
+    """
     try:
         inside = knowledge().library_file(level, into).read_bytes()
     except OSError:
@@ -135,7 +152,12 @@ def is_current(level: str, into: Path, strict: bool) -> bool:
 
 
 def compiler_for(levels: Sequence[str]) -> Compiler:
-    """The first that compiles C++20 for this machine; for the sanitizers g++, whose libraries Python can load.  Raises BuildFailed."""
+    """Return the compiler for builds of the core; `levels`: names of the builds to make.
+
+    It is the one in $CXX, or else the first of g++, clang++ and the package ziglang that is installed and compiles C++20. If `levels`
+    includes the build with sanitizers (run-time checks), it is g++, whose sanitizer libraries Python can load. Raises BuildFailed, or its
+    subclass CompilerMissing, if there is no such compiler.
+    """
     if knowledge().SANITIZED in levels:
         if sys.platform == "linux" and shutil.which("g++"):
             return Compiler(("g++",))
@@ -151,12 +173,18 @@ def compiler_for(levels: Sequence[str]) -> Compiler:
 
 
 def zig_requirement() -> str:
-    """The package that stands in for a system's compiler, in the version that is known to work."""
+    """Return the requirement for pip, "ziglang==VERSION", of the package with a compiler for systems without one.
+
+    VERSION is the one in core/compiler.lock, which is known to work.
+    """
     return re.search(r"^ziglang==[\w.]+", COMPILER_LOCK.read_text(), re.MULTILINE)[0]  # type: ignore[index]  # the lock has this line
 
 
 def oldest_glibc(library: Path) -> tuple[int, int] | None:
-    """The oldest version of the GNU C library that a library runs with; None if it is made for another C library."""
+    """Return the oldest version of the GNU C library that a library built here needs, as (major, minor), such as (2, 17).
+
+    Returns None if this Python does not run with the GNU C library.
+    """
     if platform.libc_ver()[0] != "glibc":
         return None
     named = re.findall(rb"\0GLIBC_(\d+)\.(\d+)(?:\.\d+)?(?=\0)", library.read_bytes())
@@ -164,7 +192,10 @@ def oldest_glibc(library: Path) -> tuple[int, int] | None:
 
 
 def knowledge() -> ModuleType:
-    """mobee/_core/levels.py, without the library around it, whose dependencies need not be installed to build it."""
+    """Load the file mobee/_core/levels.py as a module and return it; it has the names and paths of the builds of the core.
+
+    The package `mobee` is not imported, because its dependencies may not be installed yet when the core is built.
+    """
     name = "mobee_core_levels"
     if name not in sys.modules:
         spec = importlib.util.spec_from_file_location(name, HERE.parent / "mobee" / "_core" / "levels.py")
@@ -241,7 +272,7 @@ def _with_zig(compiler: Compiler, flags: list[str], source: Path, library: Path)
 
 
 def macos_version() -> str:
-    """The oldest macOS that a build is for."""
+    """Return the oldest version of macOS on which a build runs, such as "11.0"; the variable MACOSX_DEPLOYMENT_TARGET may set it."""
     return os.environ.get("MACOSX_DEPLOYMENT_TARGET") or ("11.0" if platform.machine() == "arm64" else "10.15")
 
 

@@ -50,7 +50,10 @@ def _stale(levels: Sequence[str]) -> list[str]:
 
 
 def wheel_platform(libraries: list[Path]) -> str:
-    """Return the platform part of a wheel's tag: by the symbols that the libraries need of the C library."""
+    """Return the platform tag of a wheel with these libraries, such as "manylinux_2_17_x86_64" or "macosx_11_0_arm64".
+
+    On Linux with the GNU C library, the tag has the oldest version of it with which all libraries run.
+    """
     if sys.platform == "darwin":
         return f"macosx_{core.macos_version().replace('.', '_')}_{platform.machine()}"
     needed = [core.oldest_glibc(library) for library in libraries]

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Run a command with the core that stops at the first wrong address or undefined operation.
+"""Run a command with a build of the core (MoBeE's C++ code) that stops at the first wrong address or undefined operation.
 
     python core/sanitize.py [--fuzzer] COMMAND [ARGUMENT ...]
 
-It builds that core if need be and puts the sanitizers' libraries into the command's process, which Python itself was built without.
-What Python and its packages never free is not counted as a leak.  With --fuzzer the libraries are those of atheris: a fuzzer is blind
-to what it covers behind those of g++.
+Builds this core if it is not current, and preloads the libraries of the sanitizers (run-time checks of memory and operations) into the
+process of the command, because Python itself was built without them. Leaks are not reported, since Python and its packages never free some
+of their memory. With --fuzzer the preloaded library is that of atheris, a fuzzer (it tests with random inputs): with the libraries of g++
+it could not measure which code its inputs reach.
 """
 
 from __future__ import annotations
@@ -27,7 +28,10 @@ SETTINGS = {
 
 
 def main() -> None:
-    """Become the command."""
+    """Replace this process by the command in the arguments, which then runs with the sanitizers and the sanitized build of the core.
+
+    If the build fails or the command cannot be started, one line says why, and the exit code is 1.
+    """
     command = sys.argv[1:]
     fuzzer = command[:1] == ["--fuzzer"]
     if fuzzer:

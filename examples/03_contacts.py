@@ -13,7 +13,10 @@ model = mobee.Model(robot, world)
 
 
 def show(what: str, q: np.ndarray, reaching: str | None = None) -> None:
-    """Print the contacts of a pose: solids are the bodies themselves, fields the volumes around them."""
+    """Print the numbers of contacts of solids (bodies) and of fields (volumes around them) in a pose, and the depths of the first two.
+
+    `what`: title of the line. `q`: posture (n,) rad. `reaching`: argument of `mobee.Model.evaluate`.
+    """
     pose = model.evaluate(q, reaching=reaching)
     print(f"{what}: {pose.count} solid contacts, {len(pose.contacts) - pose.count} of fields")
     for contact in pose.contacts[:2]:

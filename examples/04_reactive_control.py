@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The reactive layer: an attractor inside the table pulls, the contact's force stops the hand above it.
+"""The reactive control law: a spring pulls the hand to a posture inside the table, and the contact force stops it above the table.
 
-The controller is a dynamical system, M q" + C q' + L(K (q - q*)) = sum of forces (thesis eq. 5.7). The motors here follow it
-exactly; the motors of example 05 have lag, delay, backlash and noise.
+The law is M q" + C q' + L(K (q - q*)) = sum of forces (thesis eq. 5.7), with mass M, damping C and stiffness K. The function L bounds the
+force of the spring. The posture q* is called the attractor. The motors here follow the law exactly; the motors of example 05 have lag,
+delay, backlash and noise.
 """
 
 from __future__ import annotations
@@ -33,7 +34,11 @@ print(f"the attractor: left palm {100 * below:.1f} cm below the table's top, fin
 
 
 def press(contact_forces: bool) -> float:
-    """Run the controller towards the attractor; return the largest depth of the solid hand in the table, in m."""
+    """Move the robot from home for SECONDS under the control law, with the posture `target` as attractor; print the progress every second.
+
+    `contact_forces`: whether the controller computes forces that repel the hand from the table. Returns the largest depth to which a solid
+    of the robot goes into the table [m].
+    """
     controller = mobee.Controller(model, gains=mobee.Gains.default(), contact_forces=contact_forces)
     controller.reset(robot.home)
     controller.attractor = target

@@ -20,7 +20,7 @@ pitch = arm.motors.index("l_shoulder_pitch")
 
 
 def show(what: str, target: np.ndarray) -> None:
-    """Act once and print the outcome."""
+    """Move the left arm to `target` (n_part,) rad, and print the outcome after the title `what`."""
     outcome = plant.act("left_arm", target)
     error = np.rad2deg(abs(outcome.q[pitch] - target[pitch]))
     end = "settled" if outcome.settled else "timed out"

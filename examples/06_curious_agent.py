@@ -19,7 +19,7 @@ print(space)
 
 
 def agent_on(store: TransitionStore) -> mobee.CuriousAgent:
-    """Return a robot at home, and an agent with the transitions of the store."""
+    """Return a new agent that continues from the transitions in the store; it acts on an offline robot at its home posture."""
     plant = mobee.OfflinePlant(mobee.Model(robot, mobee.load_world("table")), seed=0)
     return mobee.CuriousAgent(space, plant, explorer="curious", seed=0, store=store)
 

@@ -13,7 +13,7 @@ import mobee
 
 
 class Wanderer:
-    """Goes to the neighbour that was visited least, ties at random."""
+    """An agent that moves from its state to the neighbouring state that it has visited least; it chooses at random among equals."""
 
     def __init__(self, space: mobee.Lattice, plant: mobee.Plant, seed: int = 0) -> None:
         self.space, self.plant = space, plant
@@ -34,7 +34,7 @@ class Wanderer:
         return self.model.observe(state, action, self.state)
 
     def step(self) -> float:
-        """Decide, act, observe."""
+        """Decide, act and observe once; return the information gain of the observation in nats."""
         state = self.state
         action = self.decide(state)
         outcome = self.plant.act(self.space.part, self.space.target(self.space.goal(state, action)))

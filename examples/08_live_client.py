@@ -35,7 +35,10 @@ elbow = robot.parts["left_arm"].motors.index("l_elbow")
 
 @contextmanager
 def own_system() -> Iterator[str]:
-    """`mobee launch kinematic` on a free port, ended by SIGTERM or after a minute; yields the endpoint."""
+    """Start `mobee launch kinematic` on a free port for the block of a `with` statement; yield its endpoint, "tcp/127.0.0.1:PORT".
+
+    The system ends at the end of the block, or by itself after a minute.
+    """
     with socket.socket() as probe, tempfile.TemporaryDirectory() as runs:
         probe.bind(("127.0.0.1", 0))
         endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"

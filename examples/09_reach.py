@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A hand is pulled to a point: first as a path in advance, then by a force while all other forces act too (thesis Algorithm 5).
+"""Move a hand to a point by two methods: plan a path in advance, then let a force pull the hand (thesis Algorithm 5).
 
-`reach_path` is kinematics alone. A `Reacher` pulls the marker with the whole body, tick by tick, through the controller; the limits,
-constraints and contacts of example 04 still act. If the point is out of reach, the marker rests where no small motion brings it nearer.
+The function `reach_path` uses only the kinematics of the robot. A `Reacher` instead pulls the marker (a named point on the hand) by a force
+through the controller, tick by tick, and the whole body may move. The limits, constraints and contacts of example 04 still act. If the
+point is out of reach, the marker rests where no small motion brings it nearer.
 """
 
 from __future__ import annotations

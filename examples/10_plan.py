@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The transition model that curiosity has learned is a planner from any state to any other (thesis 6.5, 7.4.1).
 
-The cables of the shoulder keep the arm from some poses. No model contains them: the agent has learned them by trying. A plan over the
-goals of actions fails there; a plan over the observed outcomes avoids them.
+The cables of the shoulder keep the arm from some poses. The model of the robot has no cables, but the agent has learned their effect by
+trying. A planner without experience expects that every action reaches its goal with the same probability, and its plans fail there. A
+planner that uses the observed outcomes avoids these transitions.
 """
 
 from __future__ import annotations
@@ -24,7 +25,10 @@ print(f"{agent.transitions} transitions: each of {space.state_actions} state-act
 
 
 def walk(planner: mobee.Planner) -> int:
-    """Perform the planned action and plan again after each, until the target is reached; return the number of actions."""
+    """Perform the planned action in each state until a target is reached; return the number of actions.
+
+    If no target is reached by PATIENCE actions, the walk ends and PATIENCE is returned.
+    """
     state = space.state_of(plant.measure(space.part))
     for taken in range(PATIENCE):
         if state in planner.targets:

@@ -25,7 +25,7 @@ TASK = {"period": 0.5, "step": 0.4}  # s, rad
 
 
 class Watched(gymnasium.Wrapper):
-    """Keeps the deepest contact of solids, in m."""
+    """Keeps in `deepest` the depth of the deepest contact of solids (bodies of robot and objects) in all steps so far [m]."""
 
     deepest = 0.0
 

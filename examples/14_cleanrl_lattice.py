@@ -18,7 +18,11 @@ gymnasium.register_envs(mobee.gymnasium)
 
 @dataclass
 class Arguments:
-    """The settings."""
+    """Settings of the environments, of Q-learning and of its exploration.
+
+    `goal`: number of the goal state. `num_envs`: number of robots. `total_steps`: steps of all robots together. `learning_rate`, `gamma`
+    (discount factor), `epsilon` (probability of a random action): as in Q-learning.
+    """
 
     goal: int = 7
     num_envs: int = 8

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A curious agent whose state holds where a cup is learns which of its actions move the cup, and pushes it to a chosen cell.
+"""A curious agent learns which of its actions move a cup, and then pushes the cup to a chosen cell of the table.
 
-Two joints of the left arm sweep the hand over the table and lift it. A state is a posture and the cell in which the cup is perceived.
-Nothing else is new: explorer, transition model and planner are those of the other examples. Offline the cup slides out of the hand
-by a quasi-static model; on a live robot, the function `see` would return the place that vision publishes.
+Two joints of the left arm sweep the hand over the table and lift it. A state of the agent is a posture together with the cell in which the
+cup is perceived. Explorer, transition model and planner are those of the other examples. Offline a quasi-static model computes how the hand
+pushes the cup; on a live robot, the function `see` would return the position that vision publishes.
 """
 
 from __future__ import annotations
@@ -36,7 +36,10 @@ errors = np.random.default_rng(0)
 
 
 def see() -> dict[str, np.ndarray]:
-    """Return the place of the cup with an error of 3 mm, as cameras would; nothing while it has fallen."""
+    """Return a dict from the name "cup" to its position (3,) m, root frame, as cameras would perceive it; an empty dict after a fall.
+
+    A normal error with a standard deviation of 3 mm is added to each coordinate.
+    """
     return {name: place + errors.normal(0.0, 0.003, 3) for name, place in cup.perceive().items()}
 
 
@@ -56,7 +59,10 @@ for number in np.argsort(-leaves, axis=None)[:5].tolist():
 
 
 def pushes(target: int, plan: bool) -> int:
-    """Push the cup from its first place to a cell, by plans or by random actions; return how many of some tries succeed."""
+    """Try TRIES times to push the cup from its first place to the cell `target`; return the number of tries that succeed.
+
+    A try has at most PATIENCE actions. `plan`: whether a plan chooses them; otherwise they are random.
+    """
     planner, reached = mobee.Planner(space, beliefs, space.in_cell(target)), 0
     for _ in range(TRIES):
         plant.act("left_arm", postures.target(11))  # aside and lifted

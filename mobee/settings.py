@@ -129,7 +129,7 @@ def named(kind: str, given: str | T, table: Mapping[str, T]) -> tuple[str, T]:
 def require_name(kind: str, given: str, table: Mapping[str, object]) -> None:
     """Raise UnknownName if `given` is neither a name in the table nor of the form `module:name`; nothing is imported.
 
-    `kind`: what is named, for the message.
+    `kind`: what is named, such as "detector", for the error message.
     """
     if ":" not in given and given not in table:
         raise UnknownName(kind, given, (*table, "module:name of your own"))
@@ -138,7 +138,7 @@ def require_name(kind: str, given: str, table: Mapping[str, object]) -> None:
 def imported(kind: str, path: str) -> Any:
     """Import and return the object that `path` names as `module:name`; raises InvalidValue if it cannot be imported.
 
-    `kind`: what the object is, for the message.
+    `kind`: what the object is, such as "detector", for the error message.
     """
     module, _, name = path.partition(":")
     try:

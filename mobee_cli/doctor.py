@@ -45,7 +45,7 @@ Verdict = Literal["ok", "note", "wrong"]
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One line of the report.
+    """The result of one check of this machine or installation, one entry of the report of `mobee doctor`.
 
     `subject`: what was checked. `verdict`: ok, note or wrong. `found`: what was found. `remedy`: what to do about it.
     """
@@ -78,8 +78,9 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def examine(endpoint: str) -> Iterator[Finding]:
-    """Yield the findings one by one; each check is independent of the others.
+    """Check Python, processor, memory, disk, compiled core, extra packages and running system, and yield the findings one by one.
 
+    Each check is independent of the others.
     `endpoint`: address at which a running system, if there is one, has its router; also the address that a new system would use.
     """
     yield _python()

@@ -22,7 +22,10 @@ IMPORT = f"import {PACKAGE}; {PACKAGE}.connect({PACKAGE}.DIRECT)"
 
 
 def main() -> None:
-    """Trim the packages of the Python that runs this."""
+    """Remove unused files and debug information of PyBullet from the packages of this Python, and print the package's name.
+
+    Without an installed PyBullet wheel nothing is changed or printed.
+    """
     packages = Path(sysconfig.get_paths()["platlib"])
     programs = list(packages.glob(f"{PACKAGE}.*.so"))
     if not programs:  # no wheel for this Python
@@ -50,7 +53,10 @@ def drop_debug_information(program: Path) -> None:
 
 
 def end_of_segments(data: bytes) -> int | None:
-    """Return where the last segment of a little-endian 64-bit ELF file ends, None for another file; only debuggers read what follows."""
+    """Return the number of bytes in an ELF file (program or library) up to the end of its last segment; None: no little-endian 64-bit ELF.
+
+    The program is loaded from the segments alone. The bytes after them are section tables and debug information. `data`: the whole file.
+    """
     if data[:6] != b"\x7fELF\x02\x01":
         return None
     table, (size, number) = struct.unpack_from("<Q", data, 32)[0], struct.unpack_from("<HH", data, 54)

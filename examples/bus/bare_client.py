@@ -35,7 +35,11 @@ def connect(endpoint: str) -> zenoh.Session:
 
 
 def call(session: zenoh.Session, key: str, request: str = "Empty", **fields: Any) -> dict[str, Any]:
-    """Call a service and return its reply."""
+    """Send a request to a service and return the fields of its reply as a dict.
+
+    `key`: key of the call. `request`: name of the request's type. `fields`: its fields, besides the header (version, id, caller). Raises
+    SystemExit if the service refuses the call, or no service answers within 2 s.
+    """
     header = {"v": VERSION, "id": uuid.uuid4().hex, "who": "bare_client"}
     encoding = f"application/msgpack;icub/{request}/{VERSION}"
     for answer in session.get(key, payload=msgspec.msgpack.encode(header | fields), encoding=encoding, timeout=2.0):

@@ -36,7 +36,7 @@ from services.robot_sim.sensors import Sensors, part_meta
 
 
 class Config(ServiceConfig, frozen=True, kw_only=True):
-    """Settings: file and flags of the process; add your own, such as the serial port."""
+    """Settings of this robot_sim, from a settings file and options of the command line. Add your own fields, such as the serial port."""
 
     rate: float = 50.0
     """Ticks a second."""
@@ -61,11 +61,18 @@ class Servos:
         self._orders: dict[int, tuple[slice, str, np.ndarray | None]] = {}  # by the first motor of the part
 
     def command(self, part: slice, mode: str, reference: np.ndarray | None) -> None:
-        """Store the command that the gate admits for a part in this tick; `reference` is None on hold."""
+        """Store the command that the safety gate (the last check before the motors) passes for a part in this tick.
+
+        `part`: indices of the part's motors. `mode`: "position", "velocity", "torque" or "hold"; in hold the part brakes and stands still.
+        `reference`: (n_part,) in rad, rad/s or N m, by mode; None in hold.
+        """
         self._orders[part.start] = (part, mode, reference)
 
     def encoders(self, k: int, dt: float) -> np.ndarray:
-        """Return the positions that the encoders measure."""
+        """Return the positions that the encoders measure, (n,) rad.
+
+        `k`: the tick. `dt`: duration of a tick [s]. This robot uses neither.
+        """
         return self.q.copy()
 
     def step(self, dt: float) -> None:
@@ -89,7 +96,10 @@ class Servos:
 
 
 class OwnRobot:
-    """The process: in every tick the gate, the motors, then `tick`, `clock` and the state of each part."""
+    """The process that takes the place of robot_sim: it drives the motors with the commands that pass the safety gates.
+
+    In every tick it lets the gates check the commands, moves the motors, and publishes `tick`, `clock` and the state of each part.
+    """
 
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:
         self.service, self.config, self.robot = service, config, robot

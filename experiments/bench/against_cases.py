@@ -132,7 +132,11 @@ def _three_agents() -> Work:
 
 
 def _chapter_8() -> Work:
-    """Measure 1/64 of a run of each strategy: of its 3000 transitions, its 6400 tries and its evaluations."""
+    """Return the work of learning to reach (thesis chapter 8), 1/64 of the full size, with each of the strategies in STRATEGIES.
+
+    A strategy decides what the agent tries next.  First an agent explores: 3000 / 64 transitions for each strategy.  Then each strategy
+    makes 100 (TRIES) of its 6400 tries (attempts to reach a target), and is evaluated once on every second target.
+    """
     arm = _first("experiments.kit.reaching.arm", "experiments.reaching.scene")
     learning = _first("experiments.kit.reaching.learning", "experiments.reaching.looks")
     targets = _first("experiments.kit.reaching.targets", "experiments.reaching.targets")
@@ -158,7 +162,10 @@ def _chapter_8() -> Work:
 
 
 def _lockstep() -> Work:
-    """Run all services; the time of their start is subtracted."""
+    """Return the work of the live system in lockstep: the processor time of all its processes for 3000 ticks.
+
+    Each time a short run and a run with 3000 more ticks are made; their difference does not contain the start of the services.
+    """
     summary_of = _first("experiments.kit.live.launch", "experiments.kit.live", "experiments.launched").summary_of
 
     def run(ticks: int) -> tuple[float, dict[str, Any]]:

@@ -166,7 +166,11 @@ def compared(peer: str, scene: Scene, ours: ModelContacts, detect: Detect) -> Ag
 
 
 def _depths_agree(peer: str, difference: Mapping[str, float]) -> bool:
-    """Return whether the depths agree within the peer's tolerance, except for pairs of kinds whose depths the peer finds by search."""
+    """Return whether the depths of both programs agree within the tolerance of this peer; True if the peer has no tolerance.
+
+    `difference`: largest difference of depths [m] by kinds of volumes ("box-capsule").  Pairs with a cylinder or a convex hull are not
+    judged, because the peers compute their depths by iterative search.
+    """
     judged = [value for kinds, value in difference.items() if not _SEARCHED & set(kinds.split("-"))]
     return peer not in _PEER_TOLERANCE or max(judged, default=0.0) <= _PEER_TOLERANCE[peer]
 

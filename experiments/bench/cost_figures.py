@@ -80,7 +80,10 @@ class CostFigure:
 
 @contextmanager
 def _measured(points: list[tuple[str, float]]) -> Iterator[Iterator[tuple[str, float]]]:
-    """Go through the points of the curves on one core, with progress."""
+    """Yield an iterator over `points`; inside the context this process runs on one core, and the iterator shows the progress.
+
+    A point is the name of a curve and a size at which it is measured.  A context manager.
+    """
     with one_core(), Progress() as progress:
 
         def shown() -> Iterator[tuple[str, float]]:

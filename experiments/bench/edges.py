@@ -81,7 +81,12 @@ def measure(settings: Settings) -> dict[str, Any]:
 
 
 def _round(model: mobee.Model, trm: Roadmap, speeds: Calibration) -> dict[str, float]:
-    """Measure each method once; `differing`: number of edges on which two methods disagree."""
+    """Measure each method once and return the times and numbers that `measure` explains, and others.
+
+    The others are "differing", the number of edges on which two methods disagree; "touching" (edges that are not free), "change_edges"
+    (edges that are checked again after an object was added), "blocked" (edges that it blocks), and the times on the standard machine,
+    "standard_thesis_s" [s] and "standard_once_us" [us], for the requirements.
+    """
     order = np.argsort(np.tile(np.arange(len(trm.edges)), 2), kind="stable")
     both_directions = np.concatenate([trm.edges, trm.edges[:, ::-1]])[order]
     plain, plain_s = processor_time(lambda: _check_every_pose(model, trm))

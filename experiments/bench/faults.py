@@ -101,7 +101,7 @@ class _DisturbedSystem:
             return len(self.observer.published)
 
     def transitions_within(self, seconds: float) -> int | None:
-        """Wait, and return the number of transitions that were published meanwhile; None for no time."""
+        """Wait `seconds` [s] and return the number of transitions that were published meanwhile; None if `seconds` is 0."""
         before = self.published
         time.sleep(seconds)
         return self.published - before if seconds else None
@@ -127,9 +127,11 @@ class _DisturbedSystem:
         return {"back_s": back, "oldest_ms": 1e3 * max(ages, default=0.0), "broken": [*broken, *too_old(ages)], **effects}
 
     def _effects(self, alone: Sequence[tuple[Fault, float, float]], states: Mapping[str, list[Moment]]) -> dict[str, Any]:
-        """Return how parts stopped after faults of controller or model, and whether actions of other parts survived the end of a process.
+        """Return the effects of faults of controller or model on the parts, and of killed processes on actions.
 
-        `alone`: see `_alone`.
+        Keys: "stops", a list with (kind of fault, `Stop`) for each part that was moving; "actions", a list with (killed process, "model" or
+        "agent"; whether the action survived) for each action that was under way in a part whose own agent was not killed.  `alone`: faults
+        as `_alone` yields them.  `states`: the states of each part.
         """
         stops = [
             (fault.kind, stop)

@@ -121,7 +121,10 @@ def _memory(stats: dict[str, Stat]) -> dict[str, float]:
 
 
 def _learns_again(system: System, session: Any) -> list[str]:
-    """Release the robot from stops, pauses and holds; return the agents that have a new transition."""
+    """Release the robot from stops, pauses and holds; return the agents that then record a new transition.
+
+    Waits at most _PATIENCE (90 s) for all agents.  Raises LaunchFailed if the robot cannot be released.
+    """
 
     def released() -> bool:
         try:

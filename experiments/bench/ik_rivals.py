@@ -153,7 +153,11 @@ def particles(problem: Problem, seed: int, most: int) -> Array | None:
 
 
 def _search(problem: Problem, most: int, ask: Callable[[], Array], tell: Callable[[Array], object], batched: bool = True) -> Array | None:
-    """Evaluate the poses (B, n) that `ask` returns and give `tell` their costs (B,), until one is good: that pose, or None after `most`."""
+    """Search for a pose within all tolerances; return it, or None after `most` evaluations.
+
+    In each generation `ask` returns poses (B, n) rad, and `tell` gets their costs (B,).  `batched`: whether the poses of a generation are
+    evaluated together; else one by one.
+    """
     while problem.evaluations < most:
         q = ask()
         parts = [problem.evaluate(q)] if batched else [problem.evaluate(one[None]) for one in q]
@@ -220,7 +224,10 @@ class MinkPeer:
         return None
 
     def _descend(self, problem: Problem, begin: Array, target: Target) -> Array | None:
-        """Return where the steps from `begin` end, or None if that is not within the tolerances."""
+        """Take at most MINK_STEPS steps of differential inverse kinematics from the posture `begin`, (n,) rad.
+
+        Returns the first posture that is near enough to the target: within STOP_SHARE of its tolerances.  None if there is none.
+        """
         configuration, task = self._configuration, self._task
         configuration.update(begin)
         for _ in range(MINK_STEPS):

@@ -221,9 +221,11 @@ def beside_mujoco(scene: Scene) -> dict[str, Contestant]:
 
 
 def _on_two_threads(scene: Scene, rounds: int) -> dict[str, float] | None:
-    """Return the wall time of a batch on one thread over that on two, and the gain of two processes here; None without threads.
+    """Return how much faster a batch of poses is on two threads than on one; None if the model has no argument `threads`.
 
-    The best of the rounds counts: while other programs use the cores, most rounds show how these are shared and not the gain of threads.
+    Keys: "gain", wall time on one thread divided by that on two; "processes", work per second of two processes divided by that of one,
+    which shows what two cores of this machine can gain at most.  Each time is the shortest of the `rounds`: while other programs use the
+    cores, most rounds measure how these are shared.
     """
     if "threads" not in inspect.signature(Model.evaluate).parameters:
         return None
@@ -241,7 +243,10 @@ def _on_two_threads(scene: Scene, rounds: int) -> dict[str, float] | None:
 
 
 def _in_turn(model: Model, q: Array, detect: Callable[[Array], object], count: int) -> Callable[[], None]:
-    """Return a function that detects in the next `count` poses at each call; forward kinematics are ours, the fastest there are."""
+    """Return a function that calls `detect` for the next `count` of the poses `q` (B, n) rad, and begins again after the last one.
+
+    `detect` gets the poses of the links, (L, 4, 4), which MoBeE's model computes.
+    """
     poses = itertools.cycle(q)
 
     def run() -> None:

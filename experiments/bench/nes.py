@@ -69,7 +69,10 @@ def measure(settings: Settings) -> dict[str, Any]:
 
 
 def _row(name: str, d: int, runs: int) -> dict[str, Any]:
-    """Return the median evaluations of every strategy, infinite where most runs fail, and the strategy's own time for one."""
+    """Return the row of the function `name` in `d` dimensions; `measure` explains its keys.
+
+    The values are medians over `runs` runs of each strategy.  The number of evaluations is inf if most runs of a strategy fail.
+    """
     row: dict[str, Any] = {"function": name, "dimensions": d}
     for strategy in ("nes", "cma", "xnes") if d <= XNES_MAX_DIMENSIONS else ("nes", "cma"):
         results = [search(strategy, name, d, seed) for seed in range(runs)]

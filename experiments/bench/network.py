@@ -174,7 +174,11 @@ class _Hosts:
         self._stack.close()
 
     def disturb(self, fault: Fault, seconds: float) -> dict[str, Any]:
-        """Disturb the network for a time, wait until all parts are back, and return what was measured."""
+        """Disturb the network for `seconds` [s], wait until every part follows commands again, and return what was measured.
+
+        Main keys: "oldest_ms", age of the oldest command that was obeyed [ms]; "held", names of the parts that at some time during the
+        fault did not follow commands; "back_s", see `_back`; "broken", list of the broken guarantees as text.
+        """
         wait_for(lambda: self._moves(BEYOND), _BACK, f"{BEYOND} moves")
         self._observer.take()
         time.sleep(_QUIET_TIME)
@@ -215,7 +219,11 @@ class _Hosts:
         }
 
     def compare(self) -> dict[str, int]:
-        """Compare the published transitions with the stores of both hosts."""
+        """Compare the published transitions with those on disk, on both hosts, and return their numbers.
+
+        Keys: "kept" (on disk), "lost" (published, but not on disk), "differing" (with other values than published) and "gaps" (on disk
+        twice, under one number).
+        """
         found = {"kept": 0, "lost": 0, "differing": 0, "gaps": 0}
         beyond = {who.removeprefix(AGENT) for who in LAYOUTS[self._layout] if who.startswith(AGENT)}
         for host, agents in (("first", sorted({*AGENTS} - beyond)), ("second", sorted(beyond))):
@@ -243,7 +251,11 @@ class _Hosts:
             return bool(changes) and changes[-1][1] == "moving"
 
     def _back(self, states: Mapping[str, list[Moment]], healed: float) -> float:
-        """Return the time [s] from the end of the fault until every part followed commands and BEYOND was moved by its agent."""
+        """Return the time [s] from the end of the fault until every part followed commands and the agent of BEYOND moved this part.
+
+        BEYOND is the part whose agent is on the second host; if it did not move, the time is at least _BACK.  `states`: the states of each
+        part.  `healed`: the monotonic time [s] at which the fault ended.
+        """
         held = [moment.at - healed for moments in states.values() for moment in moments if moment.at > healed and moment.gate != "armed"]
         with self._observer.lock:
             changes = list(self._observer.motions.get(BEYOND, []))
@@ -255,7 +267,11 @@ class _Hosts:
         return max([0.0, *held, _BACK if moved is None else moved])
 
     def _ended(self, begin: float, healed: float) -> tuple[float | None, bool]:
-        """Return when in a cut the action of BEYOND ended [s from its beginning], and whether another one began."""
+        """Return when the action of BEYOND (the part whose agent is on the second host) ended during a cut, and whether a new one began.
+
+        The time [s] counts from the beginning of the cut; None if no action ended.  Actions that began within UNDER_WAY (0.5 s) after this
+        beginning do not count as new, because their calls may have been sent before.  `begin`, `healed`: beginning and end of the cut.
+        """
         with self._observer.lock:
             changes = list(self._observer.motions.get(BEYOND, []))
         during = [change for change in changes if begin < change[0] <= healed]

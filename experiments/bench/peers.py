@@ -242,7 +242,10 @@ def _spec(mujoco: Any, robot: Robot, objects: Mapping[str, WorldObject]) -> Any:
 
 
 def _weigh(body: Any, link: int, origin: Array) -> None:
-    """Give a link a mass of 1 kg at its joint."""
+    """Give a link the mass of 1 kg and the moments of inertia of 1 kg m^2, because MuJoCo needs a mass for each.
+
+    `body`: the link's body in MuJoCo.  The mass is at the origin of the body.
+    """
     body.explicitinertial, body.mass, body.inertia = True, 1.0, np.ones(3)
 
 

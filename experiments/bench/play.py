@@ -118,7 +118,11 @@ def _start(robot: str, python: str, browser: Any) -> dict[str, Any]:
 
 
 def _environment(home: str, python: str) -> dict[str, str]:
-    """Return an environment with an empty home; a checkout of this program stays importable for this interpreter."""
+    """Return the environment variables for a process: a few of this process, and `home` as HOME.
+
+    `python`: interpreter of the process.  Only if it is the interpreter of this process, PYTHONPATH is kept, so that it can import the same
+    checkout.
+    """
     kept = {name: os.environ[name] for name in ("PATH", "LANG", "LC_ALL", "TERM") if name in os.environ}
     if python == sys.executable and "PYTHONPATH" in os.environ:
         kept["PYTHONPATH"] = os.environ["PYTHONPATH"]
@@ -126,7 +130,11 @@ def _environment(home: str, python: str) -> dict[str, str]:
 
 
 def _steps(process: subprocess.Popen[bytes], said: Path, browser: Any, begin: float) -> Iterator[tuple[str, float]]:
-    """Yield each step with its time [s] as it happens; raises TimeoutError."""
+    """Yield the name and the time [s] of each step of a start (the keys of STEPS, then SHOWN) as soon as it happens.
+
+    `said`: file with the output of `process`.  `begin`: monotonic time [s] from which the times count.  Raises TimeoutError if the process
+    ends, or if the last step has not happened after TIMEOUT (180 s).
+    """
     text, page, left = "", None, dict(STEPS)
     while True:
         if process.poll() is not None or time.monotonic() - begin > TIMEOUT:
@@ -147,7 +155,11 @@ def _steps(process: subprocess.Popen[bytes], said: Path, browser: Any, begin: fl
 
 
 def _left(home: str) -> list[int]:
-    """Return the processes whose command names a file in a home, as each service names its settings; on Linux."""
+    """Return the ids of the running processes whose command line contains a path in the folder `home`.
+
+    These are services that were left behind, because the command line of each service names its file of settings.  Without /proc (on other
+    systems than Linux) the list is empty.
+    """
     found = []
     for line in Path("/proc").glob("[0-9]*/cmdline"):
         with contextlib.suppress(OSError):  # the process has ended meanwhile

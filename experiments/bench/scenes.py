@@ -171,7 +171,10 @@ def _shape_of(index: int, entry: dict[str, Any], role: Literal["field", "solid"]
 
 
 def _pairs(shapes: tuple[Shape, ...], untested: set[frozenset[int]]) -> list[tuple[int, int]]:
-    """Return the pairs of shapes on two links that are tested against each other."""
+    """Return the pairs of shapes, as two indices each, that are tested against each other.
+
+    The shapes of a pair are on two different links.  `untested`: pairs of link numbers that are not tested.
+    """
     numbered = itertools.combinations(enumerate(shapes), 2)
     return [(i, j) for (i, a), (j, b) in numbered if a.link != b.link and frozenset((a.link, b.link)) not in untested]
 

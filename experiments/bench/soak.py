@@ -69,7 +69,7 @@ class _Ticks:
             self.ages.update(part.cmd_age for part in tick.parts.values() if part.mode != "hold")
 
     def take_ages(self) -> Counter[int]:
-        """Return the ages since the last call."""
+        """Return how often each age [ticks] of a command occurred since the last call."""
         with self.lock:
             taken, self.ages = self.ages, Counter()
         return taken
@@ -115,7 +115,10 @@ def measure(settings: Settings) -> dict[str, Any]:
 
 
 def _until_next(passed: float, share: float) -> float:
-    """Return the time until the next sample, so that the whole run has about SAMPLES."""
+    """Return the time [s] until the next sample of the processes' status, so that the whole run has about SAMPLES (200) of them.
+
+    `passed`: wall time since the beginning [s].  `share`: share of the run's simulated time that is done, 0 to 1.
+    """
     return _SHORTEST if share <= 0.0 else float(np.clip(passed / share / SAMPLES, _SHORTEST, 60.0))
 
 
@@ -166,7 +169,12 @@ def _apart(first: Counter[int], second: Counter[int]) -> float:
 
 
 def _process(hours: Any, stats: list[Stat]) -> dict[str, float]:
-    """Return the memory, its slope per robot hour with its standard error, and the growth of all numbers, of one process."""
+    """Return the memory of one process, and the growth of its memory, open files and threads, from its samples `stats`.
+
+    `hours`: time of each sample [h of the robot].  Keys: "memory_mb", memory at the end [MB]; "slope_mb_per_hour" and "slope_error", slope
+    of a straight line fitted to the memory, and its standard error [MB per hour of the robot]; "grown_mb", "more_files" and "more_threads",
+    median of the last tenth of the samples minus that of the first tenth.
+    """
     memory, files, threads = (np.array([float(stat.health.get(name) or 0.0) for stat in stats]) for name in _NUMBERS)
     fit, covariance = np.polyfit(hours, memory, 1, cov=True)
     tenth = max(1, len(memory) // 10)

@@ -119,7 +119,11 @@ def _times_in_new_process(program: str) -> tuple[float, float]:
 
 
 def _system(seconds: float, speeds: Calibration) -> dict[str, Any]:
-    """Start the default system without its page; returns the time until it was ready [s], and PSS [MiB] of each process at the end."""
+    """Run the default system without its web page for `seconds` [s] and return its times and memory.
+
+    Keys: "ready_s", the time until it was ready [s]; "standard_ready_s", the same on the standard machine; "speed", the speed of this
+    machine; "mebibytes", the memory [MiB] of each process at the end, as the function `mebibytes` returns it.
+    """
     newest: dict[str, float] = {}
 
     def update(launcher: int) -> None:
@@ -158,7 +162,11 @@ def _children(pid: int) -> list[int]:
 
 
 def _service_name(words: list[str]) -> str:
-    """Return the module in a service's command, or the name of its settings where several services share a module."""
+    """Return the name of a service, from the words of its command line.
+
+    It is the name of the file after "--config", without its ending, because several services may run the same module.  Without such a file
+    it is the module after "-m"; the module mobee_system.run, which starts others, is skipped.
+    """
     if "--config" in words:
         return Path(words[words.index("--config") + 1]).stem
     modules = [word for word in words[words.index("-m") + 1 :] if word != "mobee_system.run"] if "-m" in words else words

@@ -64,7 +64,10 @@ QUICK = Settings(floods=(NOTHING, "estop, set = false", "calls of robot_sim's st
 
 
 class _Gate:
-    """The gate of the head in robot_sim's newest state, and the time since which it has been in it [s, monotonic]."""
+    """The newest state of robot_sim's gate (the last check before the motors) for the head: `now`, such as "armed" or "estop".
+
+    `since`: the time [s, monotonic] at which this state was first published; 0 before the first message.
+    """
 
     def __init__(self, session: Any) -> None:
         self.now, self.since = "", 0.0
@@ -127,7 +130,11 @@ def _under(system: System, name: str, stops: int) -> dict[str, Any]:
 
 
 def _stop_by_record(system: System, observer: Any, gate: _Gate) -> tuple[float, bool]:
-    """Return the time [ms] from a stop that is recorded on this machine to `estop`, and whether the robot was armed again."""
+    """Stop the robot by the record of stops, a file on this machine, then release it.
+
+    Returns the time [ms] from before the file is written until the state of the head says "estop", or _GIVE_UP if it never does; and
+    whether the robot was armed (followed commands) again after the release.
+    """
     begun = time.monotonic()
     system.stop_record.stop("bench", "a test of the stop")
     while gate.now != "estop" and time.monotonic() < begun + _GIVE_UP:
@@ -137,7 +144,11 @@ def _stop_by_record(system: System, observer: Any, gate: _Gate) -> tuple[float, 
 
 
 def _stop_by_datagrams(system: System, observer: Any, gate: _Gate) -> tuple[float, bool]:
-    """Return the time [ms] from a stop that is sent past the router to `estop`, and whether the robot was armed again."""
+    """Stop the robot by UDP datagrams, which do not pass through the router, then release it.
+
+    Returns the time [ms] from before the socket is opened until the state of the head says "estop", or _GIVE_UP if it never does; and
+    whether the robot was armed (followed commands) again after the release.
+    """
     begun = time.monotonic()
     with StopSender(system.endpoint, "bench", "a test of the stop") as sender:
         while gate.now != "estop" and time.monotonic() < begun + _GIVE_UP:
@@ -150,7 +161,11 @@ def _stop_by_datagrams(system: System, observer: Any, gate: _Gate) -> tuple[floa
 
 
 def _stop_by_bus(system: System, observer: Any, gate: _Gate) -> tuple[float, float, bool]:
-    """Return the times [ms] until a new client was connected, and from its stop to `estop`; and whether the robot was armed again."""
+    """Stop the robot by messages of a new client on the bus, then release it.
+
+    Returns the time [ms] to connect the client; the time [ms] from its first message until the state of the head says "estop", or _GIVE_UP
+    if it never does; and whether the robot was armed (followed commands) again after the release.
+    """
     begun = time.monotonic()
     with open_client(system.endpoint, patience=_GIVE_UP) as session:
         publisher = Bus(session, "bench", logging.getLogger("bench")).publisher(EStop)
@@ -165,7 +180,10 @@ def _stop_by_bus(system: System, observer: Any, gate: _Gate) -> tuple[float, flo
 
 
 def _armed_again(observer: Any, gate: _Gate) -> bool:
-    """Release the robot, and return whether it is armed again; a repetition of the stop that was on its way needs a second release."""
+    """Release the robot, and return whether it is armed (follows commands) again.
+
+    Tries it twice, because a repeated stop message may arrive after the first release and stop the robot again.
+    """
     for _ in range(2):
         _release(observer)
         with suppress(LaunchFailed):
@@ -187,7 +205,10 @@ def _release(session: Any) -> None:
 
 
 def _processes(session: Any) -> dict[str, int]:
-    """Return the process of each vital service."""
+    """Return the process id of the launcher and of each vital service (robot_sim, controller and model).
+
+    Raises LaunchFailed if one does not answer.
+    """
     return {who: wait_for(partial(stat_of, session, who), 60.0, f"{who} answers").pid for who in ALL_VITAL}
 
 

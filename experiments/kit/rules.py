@@ -161,7 +161,10 @@ def better(values: Mapping[str, ArrayLike], name: str, rivals: Sequence[str], wo
 
 
 def _about_equal(first: ArrayLike, second: ArrayLike) -> bool:
-    """Return whether the interval of the ratio lies within a tenth of 1; False if a value is not above 0."""
+    """Return whether two groups have about the same mean: the interval of the ratio of their interquartile means is within 0.9 to 1.1.
+
+    `first`, `second`: a number from each run of the two groups.  The result is False if a number is not above 0.
+    """
     if min(np.min(first), np.min(second)) <= 0.0:
         return False
     return decides(ratio_interval(first, second), *ABOUT_EQUAL) is True

@@ -34,9 +34,10 @@ T = TypeVar("T")
 
 
 def new_run(runs: Path, name: str, options: Mapping[str, Any]) -> Path:
-    """Make the folder `runs`/<time>-<name> of a new run, with config.json and versions.json, and return it; raises OSError.
+    """Make the folder `runs`/<time>-<name> of a new run, with config.json and versions.json, and return it.
 
-    `name`: name of the experiment.  `options`: options of the run, by name.
+    `runs`: the folder of all runs, made if it does not exist.  `name`: name of the experiment.  `options`: options of the run, by name.
+    <time> is the local time, as 20260131-142530; if the folder exists, -2, -3, ... is appended.  Raises OSError if it cannot be written.
     """
     runs.mkdir(parents=True, exist_ok=True)
     stamp = time.strftime("%Y%m%d-%H%M%S")
@@ -259,7 +260,7 @@ class Row:
 
     @classmethod
     def columns(cls) -> tuple[str, ...]:
-        """Return the column names of the file, which are the names of the fields."""
+        """Return the names of the dataclass fields, in their order: they are the column names of the CSV file that has such records."""
         return tuple(field.name for field in fields(cls))
 
     def record(self) -> dict[str, object]:

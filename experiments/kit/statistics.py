@@ -149,7 +149,11 @@ def _quantiles(found: Array, level: float | None) -> tuple[float, float]:
 
 
 def _sampled(values: Array, statistic: Statistic, labels: Array, seed: int, resamples: int, name: object) -> Array:
-    """Return the statistic of each bootstrap sample; an `error_rate` computes it once for all levels, and identifies it by `name`."""
+    """Return the statistic of each bootstrap sample of the values (n,), (resamples,).
+
+    Inside `error_rate` the result is kept, because intervals of all levels need the same samples.  `statistic`: function of samples
+    (resamples, n).  `labels`: (n,) stratum of each value, as in `interval`.  `name`: identifies the statistic among the kept results.
+    """
     samples = _decisions.get(_Decisions()).samples
     _, stratum = np.unique(labels, return_inverse=True)
     strata = stratum.tobytes()
@@ -167,7 +171,10 @@ def estimate(values: ArrayLike, digits: int = 2) -> str:
 
 @lru_cache(maxsize=8)  # groups of one size follow each other
 def _drawn(strata: bytes, resamples: int, seed: int) -> Ints:
-    """Draw indices of values within each stratum, (resamples, n); `strata` has the number of each value's stratum, (n,) intp."""
+    """Draw bootstrap samples as indices of values, (resamples, n): entry i is drawn from the values in the same stratum as value i.
+
+    `strata`: bytes of an array (n,) intp, the number of the stratum of each value (bytes can be a key of the cache).
+    """
     stratum = np.frombuffer(strata, dtype=np.intp)
     sizes = np.bincount(stratum)
     order = np.argsort(stratum, kind="stable")
@@ -235,14 +242,22 @@ def improvement_interval(first: ArrayLike, second: ArrayLike, level: float | Non
 
 
 def _improvements(first: Array, second: Array) -> Array:
-    """Return the probabilities of improvement of groups along the last axes."""
+    """Return the share of pairs (one value of `first`, one of `second`) in which the first value is larger; ties count half.
+
+    `first`: (..., n), `second`: (..., m); the groups are along the last axis, and the axes before it are those of the bootstrap samples.
+    Returns shape (...).
+    """
     difference = first[..., :, None] - second[..., None, :]
     found: Array = (difference > 0.0).mean(axis=(-2, -1)) + 0.5 * (difference == 0.0).mean(axis=(-2, -1))
     return found
 
 
 def _of_both(first: ArrayLike, second: ArrayLike, compare: Callable[[Array, Array], Array], level: float | None) -> tuple[float, float]:
-    """Return the bootstrap interval of a statistic of two groups, which are along the last axes."""
+    """Return the bootstrap interval (low, high) of a statistic of two groups (n,) and (m,), each of them resampled for itself.
+
+    `compare`: computes the statistic; it gets the bootstrap samples of both groups, (..., n) and (..., m), and returns shape (...).
+    `level`: confidence level, 0 to 1; None: the level of `decision_level`.
+    """
     groups = [_checked(first), _checked(second)]
     sizes = [len(group) for group in groups]
     labels = np.repeat([0, 1], sizes)

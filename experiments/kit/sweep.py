@@ -144,14 +144,20 @@ _SUMMARY = "is_summary"
 
 
 def _summarised(one: CellResult, summary: Callable[[dict[str, Any]], dict[str, Any]]) -> CellResult:
-    """Return a cell with reduced values."""
+    """Return a copy of the result of a cell (one trial), with `summary` applied to its values.
+
+    `summary`: function that reduces the values to those that the results and the figure need.
+    """
     found = CellResult(one.cell, one.seconds, one.path)
     vars(found)["values"] = _reduced(summary, one.values)  # where the property keeps what it has read
     return found
 
 
 def _reduced(summary: Callable[[dict[str, Any]], dict[str, Any]], values: dict[str, Any]) -> dict[str, Any]:
-    """Return the summary of values; those of a record are reduced already."""
+    """Return the values that `summary` computes from the values of a cell (one trial), marked as reduced.
+
+    Values with this mark, such as those that were read from a raw record, are returned unchanged.
+    """
     return values if values.get(_SUMMARY) else summary(values) | {_SUMMARY: True}
 
 

@@ -66,7 +66,7 @@ def stay_apart(scene: BulletScene, pairs: list[list[str]], poses: list[Array]) -
 
 
 def main() -> None:
-    """Write solid_pairs.json, and print how many pairs it has."""
+    """Write solid_pairs.json, the pairs of links that count as solid contact in the simulator, and print how many pairs it has."""
     robot, world = load_robot("icub"), load_world("table")
     scene = BulletScene(robot, world, substep=0.005)
     solid = sorted(name for name in scene.links if not name.endswith("_dh_frame"))

@@ -364,7 +364,10 @@ def drawn() -> Robot:
 
 
 def add_markers(parent: ET.Element, data: dict[str, Any], link: str, point: Array) -> None:
-    """Add the markers of a link to the XML element `parent`; positions are written relative to `point` (3,) m, root frame."""
+    """Add the markers of a link (named frames with a normal direction: palms, elbows, eyes and head) to the XML element `parent`.
+
+    `point`: origin of `parent`, (3,) m, root frame at zero pose.
+    """
     model = data["models"]["icub_v2_5"]
     palms = model["end_effector_zero_root"]
     for side, sign in (("left", -1.0), ("right", 1.0)):

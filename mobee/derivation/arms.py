@@ -36,10 +36,10 @@ LONGEST = 24  # letters of a name, which stands in the keys of the bus
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Chain:
-    """An arm or leg: a chain of joints from the base, or a branching of the tree, to a hand or to a link without further joints.
+    """An arm or leg: a chain of joints in the tree of the robot. It starts at the base or where the tree branches.
 
-    `joints`: indices, the joint nearest to the base first. `end`: index of the last link of the chain. `hand`: indices of all joints that
-    this link carries, those of the fingers; empty if there is no hand.
+    It ends at a hand, or at a link without further joints. `joints`: indices, the joint nearest to the base first. `end`: index of the last
+    link of the chain. `hand`: indices of all joints that the last link carries, those of the fingers; empty if there is no hand.
     """
 
     joints: tuple[int, ...]

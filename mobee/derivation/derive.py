@@ -44,8 +44,8 @@ class Arm:
 class Derived:
     """A robot that curious agents can use at once, and the derived values.
 
-    `robot`: the robot with all changes. `arms`: the arms that learn. `limited`: names of motors that had a range of a turn or more; the
-    range is now at most half a turn to each side. `home_moved`: names of motors whose home was moved, so that at home no solids (rigid
+    `robot`: the robot with all changes. `arms`: the arms that learn. `limited`: names of motors that could turn a joint by more than
+    a turn; their range is now one turn. `home_moved`: names of motors whose home was moved, so that at home no solids (rigid
     volumes of links) touch and no fields (volumes that cause repulsive forces) overlap. `narrowed`: names of motors whose range is narrower
     now, because in the rest of the old range some pairs of solids touch and fields cannot prevent it. Where this depends on several motors,
     clauses (conditions on motor positions) were added to the robot instead. `left_out`: pairs of names of links that are no longer tested

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Keeps the links of a robot apart: chooses the pairs of links to be tested, a home without contacts, fields, and limits.
+"""Keeps the links of a robot apart: chooses the pairs of links to be tested, fields, limits, and a home without contacts.
 
-Pairs of links that touch in most poses are not tested for contacts. The others are kept apart by fields (volumes that cause repulsive
+Pairs of links that touch in most poses are not tested for contacts. The other pairs are kept apart by fields (volumes that cause repulsive
 forces), or by motor limits and clauses (conditions on motor positions) where fields cannot do it, for example because the links are too
 near each other. Whether two links touch depends only on the motors of the joints between them. From the space of the positions of these
 motors, half-spaces are cut off until no sampled position is left in which the links touch. A half-space along a single motor becomes a
@@ -92,7 +92,7 @@ def _short_levers(pose: Pose, short: float) -> set[tuple[int, int]]:
     """Return the pairs of shapes with short levers that limits or clauses can keep apart (see `can_cut`).
 
     The lever of a contact is the norm of the derivatives of its depth by the motors. The levers of a pair are short if their median over
-    its contacts in the poses of `pose` is below `short` times `Robot.least_lever`.
+    some of its contacts (at most 15) in the poses of `pose` is below `short` times `Robot.least_lever`.
     """
     robot, table = pose.robot, pose.table
     rows: dict[tuple[int, int], list[int]] = {}
@@ -188,11 +188,11 @@ def with_fields(robot: Robot, pairs: Ints, width: float, seed: int, short: float
     """Add fields (volumes that cause repulsive forces) around solids; return the robot, and the pairs (r, 2) of solids that get none.
 
     `pairs`: (p, 2) indices of shapes, the pairs of solids that fields should keep apart. `width`: m, distance by which fields extend beyond
-    the solids. A pair gets fields of the full width, or else of 1/2, 1/4 or 1/8 of it. A width is not used for a pair whose fields would
-    overlap at home or in more than FIELD_OFTEN (60 %) of random poses. It is also not used for a pair with short levers, if limits and
-    clauses (conditions on motor positions) can keep the pair apart (see `can_cut`). The lever of a contact is the norm of the
-    derivatives of its depth by the motors; the levers of a pair are short if their median over the random poses in which it has a contact
-    is below `short` times `Robot.least_lever`. `seed`: seed of the random poses.
+    the solids. A pair gets fields of the full width, or else of 1/2, 1/4 or 1/8 of it. A width is not used for a pair in two cases.
+    First, its fields would overlap at home or in more than FIELD_OFTEN (60 %) of random poses. Second, the levers of the pair are short,
+    and motor limits and clauses (conditions on motor positions) can keep the pair apart instead (see `can_cut`). The lever of a contact is
+    the norm of the derivatives of its depth with respect to the motors. The levers are short if their median, over some of the random
+    poses in which the fields overlap, is below `short` times `Robot.least_lever`. `seed`: seed of the random poses.
     """
     for suffix, size in SIZES.items():
         robot, pairs = _with_fields(robot, pairs, size * width, suffix, seed, short)

@@ -247,8 +247,8 @@ class LatticeVectorEnv(RobotVectorEnv):
     def step(self, actions: Ints) -> tuple[Ints, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
         """Perform a whole action of each robot; a robot whose episode has ended ignores its action and begins a new episode.
 
-        `actions`: (num_envs,). Return states, rewards, whether goals were reached, whether episodes are truncated, each (num_envs,), and
-        infos.
+        `actions`: (num_envs,), the index of a neighbour of each robot's state, as in `LatticeEnv`. Return states, rewards (0 for a robot
+        that begins an episode), whether goals were reached, whether episodes are truncated, each (num_envs,), and infos.
         """
         chosen, over = np.asarray(actions).tolist(), self._over
         moving = [not done and arm.begin(action) for arm, action, done in zip(self._arms, chosen, over.tolist(), strict=True)]

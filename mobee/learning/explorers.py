@@ -64,10 +64,10 @@ class SampledBeliefs:
 
 
 def posterior_sampling(agent: Explorable, state: int, rng: np.random.Generator) -> Array:
-    """Score the actions of a state by the discounted information gain in a transition model drawn from the posterior (Strens 2000).
+    """Return the values (A,) of the actions of `state` in a plan with a transition model drawn from the posterior (Strens 2000).
 
-    The random numbers of the draw stay the same for 1 / (1 - discount) transitions. During this time the drawn model changes only because
-    the counts change. `rng`: not used.
+    The value of an action is the expected discounted sum of information gains. The random numbers of the draw stay the same for
+    1 / (1 - discount) transitions. During this time the drawn model changes only because the counts change. `rng`: not used.
     """
     model = agent.model
     episode = agent.transitions // round(1.0 / (1.0 - agent.discount))
@@ -103,7 +103,7 @@ HORIZONS = 2.0  # length of the simulated plan, in units of 1 / (1 - discount)
 
 
 def depleting(agent: Explorable, state: int, rng: np.random.Generator) -> Array:
-    """Score actions by the discounted sum of expected information gains; if scores are nearly equal, a second plan decides.
+    """Return scores (A,) of the actions of `state`: discounted sums of expected information gains; if nearly equal, a second plan decides.
 
     The explorer `curious` plans with the gain that the last try of each action gave. This explorer plans with the gain that is expected
     from the next try. The expectation uses the outcome probabilities of `TransitionModel.debiased`: real counts and a weak prior. If the
@@ -113,9 +113,9 @@ def depleting(agent: Explorable, state: int, rng: np.random.Generator) -> Array:
     If the scores of several actions are below the highest score by at most 1 % of the largest gain, the first plan is simulated from the
     present state with the most probable outcome of each action, and the gains of the simulated actions are reduced as if these outcomes
     were observed. The reduced gains are the rewards of a second plan. The score of each of the several actions is then its expected gain
-    plus the discounted value that the second plan has after it; the other actions get -inf. In the second plan, a state with one untried
-    action has a lower value than a state with sixteen untried actions. Both plans use the outcome model `agent.beliefs`. Raises
-    InvalidValue if the agent's divergence is neither "kail" nor "kl".
+    plus the discounted value that the second plan has after it; the other actions get -inf. The purpose of the second plan is to prefer a
+    state with sixteen untried actions to a state with one. Both plans use the outcome model `agent.beliefs`. Raises InvalidValue if the
+    agent's divergence is neither "kail" nor "kl".
     """
     model, actions = agent.model, len(agent.model.space.actions(state))
     if model.divergence not in DIVERGENCES:
@@ -164,17 +164,21 @@ def curious(agent: Explorable, state: int, rng: np.random.Generator) -> Array:
 
 
 def random(agent: Explorable, state: int, rng: np.random.Generator) -> Array:
-    """Score all actions of a state equally, so that each is taken with the same probability."""
+    """Return the score 0 for each action of `state`, shape (A,), so that each is taken with the same probability."""
     return np.zeros(len(agent.model.space.actions(state)))
 
 
 def least_tried(agent: Explorable, state: int, rng: np.random.Generator) -> Array:
-    """Score actions by how rarely they were tried in this state, so that the action with the fewest tries is taken."""
+    """Return scores (A,) of the actions of `state`: minus the number of tries, so that the action with the fewest tries is taken."""
     return -agent.model.tries[state, : len(agent.model.space.actions(state))].astype(np.float64)
 
 
 def nearest_untried(agent: Explorable, state: int, rng: np.random.Generator) -> Array:
-    """Score actions by how soon they lead to a state-action that was never tried; if all were tried, to one with the fewest tries."""
+    """Return scores (A,) of the actions of `state`: the sooner an action leads to a state-action that was never tried, the higher.
+
+    If all state-actions were tried, those with the fewest tries take their place. The scores are the values of the actions in a plan in
+    which these state-actions have the reward 1 and all others 0. `rng` is not used.
+    """
     tries = agent.model.tries
     exists = agent.model.reward != -np.inf
     reward = np.where(exists, tries == tries[exists].min(), -np.inf)
@@ -182,7 +186,11 @@ def nearest_untried(agent: Explorable, state: int, rng: np.random.Generator) -> 
 
 
 def count_bonus(agent: Explorable, state: int, rng: np.random.Generator) -> Array:
-    """Score actions by the discounted sum of the rewards 1 / sqrt(1 + tries) of state-actions (Strehl and Littman 2008)."""
+    """Return the values (A,) of the actions of `state` in a plan in which rarely tried state-actions have high rewards.
+
+    The reward of a state-action is 1 / sqrt(1 + tries), with the number of its tries (Strehl and Littman 2008). The value of an action is
+    the expected discounted sum of rewards. `rng` is not used.
+    """
     reward = np.where(agent.model.reward != -np.inf, 1.0 / np.sqrt(1.0 + agent.model.tries), -np.inf)
     return agent.plan(reward, key="count_bonus")[1][state, : len(agent.model.space.actions(state))]
 

@@ -76,9 +76,9 @@ def pursued(space: Space, goal: Goal | None, weight: float | None, explorer: str
 
 
 def require_pursuing(explorer: str) -> None:
-    """Raise InvalidValue if `explorer`, the name of a method of choosing actions, is not in PURSUING: only "curious".
+    """Raise InvalidValue if an explorer (a method of choosing actions) ignores external rewards.
 
-    All other explorers ignore external rewards.
+    `explorer`: its name. Only "curious", the one name in PURSUING, uses external rewards.
     """
     if explorer not in PURSUING:
         raise InvalidValue(f"the explorer {explorer!r} ignores a goal: take {' or '.join(map(repr, PURSUING))}, or leave the goal out.")

@@ -99,8 +99,8 @@ class Plans:
     ) -> tuple[Array, Array]:
         """Compute and store the plan `key` for a reward (S, A) and beliefs; return the values of states (S,) and of actions (S, A).
 
-        `requested`: the arguments `reward` and `beliefs` of the request for this plan; None stands for the agent's own. Later calls of
-        `made` return the plan only if they are given the same two objects.
+        `requested`: the two objects by which `made` finds the plan again. They are the reward and beliefs that the caller of
+        `CuriousLearner.plan` gave, where None stands for the agent's own; `reward` and `beliefs` are the arrays and model that are used.
         """
         if self.relative:
             before = self._made.get(key)

@@ -21,7 +21,7 @@ MARGIN = 0.01  # m: a place seen by the calibrated cameras is wrong by 2 mm (med
 
 
 class ObjectSpace(Space):
-    """A space whose states are pairs of a posture and a cell of an object: state = posture + postures * cell.
+    """A space whose states are pairs of a posture and a cell of an object: state = posture + number of postures * cell.
 
     The actions of a state are those of its posture. The goal of an action has the same cell, so a learner is surprised if an action moves
     the object. Agents, explorers and planners use this space as any other. The plant must perceive the object: use `PerceivingPlant`, or

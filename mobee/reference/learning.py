@@ -52,9 +52,10 @@ def forget(bins: Bins, floor: Bins, factor: float) -> Bins:
 
 
 def observe_among_all(counts: Array, outcome: int) -> tuple[Array, float]:
-    """Count an outcome in a model with a count for each state (thesis 6.4.2); return the new counts (S,) and the reward in nats.
+    """Count an outcome in a model with a count for each state (thesis 6.4.2); return the new counts (S,) and the reward.
 
-    `counts`: (S,), 1 for each state before the first observation. `outcome`: index of a state.
+    The reward is the Kullback-Leibler divergence of the new distribution from the old one, in nats (eq. 6.5). `counts`: (S,), 1 for each
+    state before the first observation. `outcome`: index of a state.
     """
     after = counts.copy()
     after[outcome] += 1.0

@@ -144,8 +144,8 @@ def command(s: MotorState, where: slice, mode: str, reference: Array | None = No
     """Set the kind of command (`mode`) and the reference of some motors, in place; `where`: their slice of q.
 
     `mode`: "position" (reference in rad), "velocity" (rad/s), "torque" (N m) or "hold" (None). If the mode of a motor changes, its delayed
-    commands would have another unit: they are replaced by the motor's present velocity, or by the torque that carries its load. In torque
-    mode the gear is rigid, so the motor side starts at the joint's position.
+    commands, which may have another unit, are replaced: in torque mode by the torque that carries its load, else by its present velocity.
+    In torque mode the gear is rigid, so the motor side starts at the joint's position.
     """
     if reference is not None:
         s.reference = s.reference.copy()

@@ -9,8 +9,8 @@ Default law: J^T control oscillates if the motors execute commands with a delay,
 J J^T plus, for a far target, a term from the curvature of the marker's path. J^T control also stops in singular poses (thesis 5.1).
 Therefore the marker is pulled at the same RATE in every direction, by (J E J^T + damping)^-1 e, where e is the remaining error and E the
 mobility of the motors (`motor_mobility`). The force leads out of a singular pose along a direction in which the error has negative
-curvature. If the forces at limits, clauses (conditions on motor positions) and contacts oppose the motion, its component against them is
-reduced, so that it slides along them. The attractor's spring is removed while the reach lasts.
+curvature. If the forces at limits, clauses (conditions on motor positions) and contacts oppose the motion, the component of the reach's
+force against them is reduced, so that the marker slides along them. The attractor's spring is removed while the reach lasts.
 """
 
 from __future__ import annotations
@@ -92,10 +92,10 @@ class View:
     """The errors of a reaching marker in a pose, and the derivatives of its position and rotation.
 
     All vectors are in the root frame. `error`: (3,) m, from the marker to its goal. `turn`: (3,) n x n*, the axis about which the marker's
-    normal n should turn to the wanted normal n*; for a target that the marker shall face, it is reduced within FACING (2 cm) of the
-    target's centre. `facing`: n . n*. `columns`: (k, 6), velocity and angular velocity of the marker for each of the k joints between base
-    and marker. `drives`: (k, m), motion of these joints when one of the m pulled motors (`Reach.motors`) moves by 1 rad (a slide: by its
-    `motor_units`).
+    normal n should turn to the wanted normal n*. If the marker shall face the target and is nearer than FACING (2 cm) to its centre, `turn`
+    is multiplied by distance / FACING. `facing`: n . n*. `columns`: (k, 6), velocity and angular velocity of the marker for each of the k
+    joints between base and marker. `drives`: (k, m), motion of these joints when one of the m pulled motors (`Reach.motors`) moves by 1 rad
+    (a slide: by its `motor_units`).
     """
 
     error: Array
@@ -216,7 +216,7 @@ def note_error(r: Reach, error: Array, dt: float) -> None:
 
 
 def motor_mobility(r: Reach, q: Array, slope: Array) -> Array:
-    """Return the mobility E of the m pulled motors, (m,): the velocity of each motor per unit of force.
+    """Return the mobility E of the m pulled motors, (m,) s: the velocity [rad/s] of each motor per unit of force [rad/s^2].
 
     It is the gain `client_slope` (k of eq. 5.8) divided by the gain `damping`. It is 0 for a motor that is in the outer half of a limit
     zone, where the force at limits f_lim acts, if the reach would move it towards the limit. `slope` (m,): J^T e, as `slope_at` returns it.
@@ -245,11 +245,13 @@ def pushed(r: Reach, v: View, marker_mobility: Array, pull: Array, mobility: Arr
 
 
 def bend_of_path(v: View, push: Array, mobility: Array) -> Array:
-    """Return the stiffness that the curvature of the marker's path adds to the reach, (m, m): -E^1/2 (push . d2x/dq2) E^1/2.
+    """Return the matrix -E^1/2 (push . d2x/dq2) E^1/2 for the m pulled motors, (m, m) 1/s, where x is the position of the marker.
 
-    `push` (3,) or (6,): the force on the marker, as `pushed` returns it. `mobility` (m,): E, from `motor_mobility`. x: the position of the
-    marker. For two joints a and b, a nearer to the base, d2x/(da db) is the cross product of the axis of a and the derivative dx/db. If
-    `push` has six components, the last three add a similar term for the rotation.
+    It is a stiffness: the curvature of the marker's path adds it to the stiffness of the force that pulls the marker. `push` (3,) or (6,):
+    this force, as `pushed` returns it. `mobility` (m,): diagonal of E, from `motor_mobility`.
+
+    For two joints a and b, a nearer to the base, d2x/(da db) is the cross product of the axis of a and the derivative dx/db. If `push` has
+    six components, the last three add a similar term for the rotation.
     """
     count = len(v.columns)
     along = np.zeros((count, count))
@@ -280,12 +282,13 @@ def largest_eigenvalue(matrix: Array, mobility: Array, turns: int) -> tuple[floa
 
 
 def along_walls(r: Reach, v: View, s: State, against: Array, force: Array, mobility: Array, size: float, pull: Array) -> Array:
-    """Return the force of the reach on the m pulled motors, (m,), with a reduced component against the forces at limits and contacts.
+    """Return the force of the reach on the m pulled motors, (m,), changed so that they slide along limits and contacts.
 
-    The stronger these opposing forces are, the smaller the component is, so that the motors slide along limits and contacts. `against`
-    (n,) rad/s^2: the sum of all other forces except the attractor's spring and the damping. `force` (m,): the force of the reach before
-    this change. `mobility` (m,): E, from `motor_mobility`. `size`: norm of J E J^T. `pull` (3,) or (6,): the wanted velocity of the marker,
-    divided by `size`.
+    If the forces at limits or contacts oppose the reach, its component against them is reduced, the more the stronger they are.
+
+    `against` (n,) rad/s^2: the sum of all other forces except the attractor's spring and the damping. `force` (m,): the force of the reach
+    before this change. `mobility` (m,): E, from `motor_mobility`. `size`: norm of J E J^T. `pull` (3,) or (6,): the wanted velocity of the
+    marker, divided by `size`.
     """
     jacobian, unit = rows(r, v)[0], motor_units(r.robot)[r.motors]
     limit = limit_force(s)[r.motors]

@@ -147,7 +147,8 @@ def places(camera: Camera, depth: Floats, which: NDArray[np.bool_]) -> Floats:
 def pixel_middles(camera: Camera) -> tuple[Floats, Floats]:
     """Return the coordinates of the pixels' centres: of the columns, (W,) m, and of the rows from top to bottom, (H,) m.
 
-    The first are measured along the camera's axis right, the second along its axis up.
+    The first are measured along the camera's axis right, the second along its axis up. The origin is that of the root frame; for a
+    perspective camera it is the point 1 m ahead of the eye.
     """
     right = camera.corner[0] + (np.arange(camera.width) + 0.5) / camera.scale
     up = camera.corner[1] - (np.arange(camera.height) + 0.5) / camera.scale

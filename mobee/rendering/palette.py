@@ -44,7 +44,10 @@ MORE_PARTS: tuple[Color, ...] = ((124, 214, 150), (178, 150, 255), (240, 150, 90
 
 
 def colors_of_all(parts: Collection[str]) -> dict[str, Color]:
-    """Return all parts with their colours (8-bit red, green, blue): those of `colors_of`, and five further colours, which may repeat."""
+    """Return all `parts` of a robot with their colours (8-bit red, green, blue).
+
+    The parts in `colors_of` have their colours there. All others get five further colours in turn, which repeat after five parts.
+    """
     known = colors_of(parts)
     rest = [part for part in parts if part not in known]
     return {part: known[part] if part in known else MORE_PARTS[rest.index(part) % len(MORE_PARTS)] for part in parts}

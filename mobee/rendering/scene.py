@@ -128,10 +128,10 @@ class Scene:
         return picture.reshape(height, width, 3)
 
     def light(self, view: View, hidden: frozenset[int], pixels: Pixels, brightness: Floats) -> None:
-        """Draw K pixels of a view: add what they show to `brightness` (K, 3), in place: red, green and blue, 0 to 255.
+        """Draw K pixels of a view: add the colour that each pixel shows (red, green, blue, 0 to 255) to `brightness` (K, 3), in place.
 
-        `view`: place, axes and field of view of the camera. `hidden`: indices of links that are not drawn, such as the link of the camera.
-        `pixels`: the K pixels.
+        The sum of several calls makes a picture with motion blur. `view`: place, axes and field of view of the camera. `hidden`: indices of
+        links that are not drawn, such as the link of the camera. `pixels`: the K pixels.
         """
         shown = self._packed(hidden)
         packs = shown.at(self._transforms, self._objects)

@@ -139,7 +139,7 @@ def recorded(plant: OfflinePlant, step: float = 0.05) -> Iterator[Recording]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Panel:
-    """A picture (H, W, 3) of a sheet, with the text `caption` below it."""
+    """One picture (H, W, 3) on a sheet (a file of several pictures), with the text `caption` below it."""
 
     picture: Picture
     caption: str = ""

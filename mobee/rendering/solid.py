@@ -46,8 +46,8 @@ class Solid:
 
     Attributes:
         kind: "sphere", "box", "cylinder", "capsule", "convex" or "mesh".
-        size: m, depends on the kind: sphere (radius,); capsule and cylinder (radius, height); box (x, y, z), full edges; convex and mesh
-            ().
+        size: m, depends on the kind: sphere (radius,); cylinder (radius, height) and capsule (radius, height without the caps), both along
+            the solid's z axis; box (x, y, z), full edges; convex and mesh ().
         position: (3,) m, root frame.
         rotation: (3, 3), root frame.
         color: red, green, blue, 0 to 1.
@@ -289,7 +289,7 @@ def coarser(solids: Sequence[LinkSolid], budget: int) -> list[LinkSolid]:
 
 
 def robot_solids(pose: Pose, bright: Iterable[str] | None = None) -> list[Solid]:
-    """Return the solids that are drawn for a robot in one pose; the solids of a link form a group.
+    """Return the solids that are drawn for a robot in one pose; the solids of one link have the same `group` (see `Solid`).
 
     `bright`: names of the parts in full colour, all others are pale; None: all parts are in full colour.
     """

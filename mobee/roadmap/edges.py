@@ -166,7 +166,10 @@ class EdgeWatch:
         self.free: Flags = check_edges(model, q, edges, step, marker, threads)
 
     def update(self) -> Ints:
-        """Check again the edges that a change of the world since the last update may affect; return the indices of these edges."""
+        """Check again the edges that a change of the world since the last update may affect, and return their indices.
+
+        The attribute `free` is updated for these edges.
+        """
         old, new = self._seen, self._model.world.snapshot
         self._seen = new
         changed = _changed(old, new)

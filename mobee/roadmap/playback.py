@@ -237,7 +237,8 @@ def play(
 ) -> Played:
     """Simulate the robot on an `OfflinePlant` along a path (K, n) rad, from the first pose of the path.
 
-    After the planned motion the simulation continues until the robot is at rest, but for at most 5 s.
+    The result has the planned and the real positions and the depths of contacts in each tick (time step of the simulation). After the
+    planned motion the simulation continues until the robot is at rest, but for at most 5 s.
 
     Args:
         model: the robot in its world.
@@ -249,7 +250,7 @@ def play(
         seed: of the encoders' noise.
 
     Raises:
-        InvalidValue: an argument is out of its range; the message states the valid one.
+        InvalidValue: an argument is out of its range (the message states the range), or all poses of the path are the same.
     """
     given, robot = _within(model.robot, path), model.robot
     law = Gains.default() if gains is None else gains

@@ -83,8 +83,9 @@ class Roadmap:
     def vertex_path(self, q_from: ArrayLike, y_goal: ArrayLike, free: bool = False) -> list[int]:
         """Return the numbers of the vertices on the shortest path from `q_from` (n,) rad to the vertex nearest to `y_goal` (m,).
 
-        `free`: return only a path without contacts in the present world. Raises InvalidValue if the roadmap is empty or has no vertex near
-        the goal, and MobeeError if start and goal are in unconnected parts of the map or every path has contacts.
+        `free`: return only a path without contacts in the present world. Raises InvalidValue if the roadmap is empty, if no vertex is
+        within 1.5 spacings of the goal, or if an argument is not valid; MobeeError if start and goal are in unconnected parts of the map,
+        or if every path has contacts.
         """
         if free:
             return free_path(self.model, self.graph, self.edges, self._posture(q_from), self._from(q_from), self._to(y_goal))
@@ -107,7 +108,8 @@ class Roadmap:
                 are within 1.5 spacings of it.
 
         Raises:
-            InvalidValue: the map is empty, or has no vertex near the goal.
+            InvalidValue: the map is empty; an argument has a wrong shape or is not finite; or no vertex is within 1.5 spacings of the goal
+                (the distance in task coordinates, each divided by its `spacing`).
             MobeeError: start and goal are in unconnected parts of the map, or every path has contacts.
         """
         start = self._posture(q_from)

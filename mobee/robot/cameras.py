@@ -59,11 +59,12 @@ def _eyes(robot: Robot) -> dict[str, Camera]:
 
 
 def camera_on(robot: Robot, text: str) -> Camera:
-    """Return the camera that a text describes: NAME, NAME=x,y,z or NAME=x,y,z,dx,dy,dz; raises InvalidValue or UnknownName.
+    """Return the camera that a text describes: NAME, NAME=x,y,z or NAME=x,y,z,dx,dy,dz.
 
     NAME is a marker or a link; x, y, z: position [m], and dx, dy, dz: direction of view, both in the frame of the marker or link.  The
     default is the origin, with the view along a marker's normal or a link's x axis.  The frame of a link has the axes of the root frame
     at zero pose and its origin on the axis of the joint that moves the link.  A camera at the origin does not see the link that carries it.
+    Raises UnknownName if there is no marker or link NAME; InvalidValue for faulty numbers or a direction of length 0.
     """
     name, equals, given = text.partition("=")
     numbers = _numbers(text, given) if equals else []

@@ -27,7 +27,7 @@ NEGLIGIBLE = {
 def models_folder() -> Path:
     """Return the folder `iCub` of the installed package icub-models, which contains the folders `robots` and `meshes`.
 
-    Raises MobeeError if the package or the robot's file is missing.
+    Raises MobeeError if the package is not installed, or if the folder has no URDF of the iCub (robots/iCubGazeboV2_5/model.urdf).
     """
     try:
         package = importlib.import_module("icub_models")

@@ -75,7 +75,8 @@ def find_file(name_or_path: str | Path, folder: Path, kind: str) -> Path:
     """Return the path of a robot or world file, which is given as a path or as a shipped name.
 
     `folder`: folder of the shipped files. `kind`: "robot" or another word for the messages; for a robot, names of MuJoCo Menagerie are
-    valid too. Raises InvalidValue, UnknownName or RobotFileError if there is no such file.
+    valid too. Raises InvalidValue if the argument is neither text nor a path; UnknownName for an unknown name; RobotFileError if the path
+    is not an existing file, if it is a xacro file (not converted to URDF), or if a download fails.
     """
     if not isinstance(name_or_path, str | Path):
         raise InvalidValue(f"{kind} is {name_or_path!r}; it must be a path, or a name: {', '.join(shipped(folder))}.")

@@ -6,14 +6,15 @@ it descends the tree from A and from each sibling of A; the rules differ in wher
 against each other. Solids of neighbours are not tested against each other if both elements are of one part, or one carries the other, or
 both have the same parent.
 
-adjacency="published_2014" is the rule of the program (kailfrank/MoBeE, KinTreeNode::ignoreAdjacentPairs). A branch of the search first
-descends until it has passed two elements that have a solid: a link whose parent is a joint, and a joint whose parent is a link. From then
-on it ends before the first element with another tag than A. Neither condition applies to A, its siblings and elements directly below the
-root: they are never one of the two elements, and the search never ends before them.
+adjacency="published_2014" is the rule of the program (kailfrank/MoBeE, KinTreeNode::ignoreAdjacentPairs). A branch of the search has two
+phases. First it descends until it has passed two elements with a solid: a <link> with a <joint> as parent, and a <joint> with a <link> as
+parent. Then it continues as long as the elements have the tag of A, and ends before the first element with the other tag. A, its siblings
+and the elements directly below the root are exceptions: in the first phase they do not count, and in the second phase the search does not
+end before them.
 
 adjacency="recorded_2014" is an earlier interpretation, with which this project recorded its results on icub_2014. A branch of the search
-ends after it has reached one link and one joint that have a solid, in the search for pairs of solids, or a field, in the search for pairs
-of fields; A itself does not count. By this rule no field of icub_2014 touches another field at home; by the rule of the program the
+continues until it has met a <link> and a <joint>, in either order, that have a solid (to find pairs of solids) or a field (to find pairs of
+fields). A itself does not count. By this rule no field of icub_2014 touches another field at home; by the rule of the program the
 forearm's field is 3 mm deep in the field of the thumb.
 """
 
@@ -107,13 +108,14 @@ def _reason(elements: Sequence[Element], i: int, j: int, role: str, near: Collec
 
 
 def neighbours(elements: Sequence[Element], bearing: Collection[int]) -> set[frozenset[int]]:
-    """Return the pairs of neighbours in the tree by the rule "published_2014", as indices of elements; element 0 is the root of the file.
+    """Return the pairs of neighbours in the tree by the rule "published_2014", as sets of indices of elements; element 0 is the root.
 
-    `bearing`: the elements that have a solid. For each element A, a search descends the tree from A and from each sibling of A; the
-    elements that it reaches are neighbours of A. A branch of the search first descends until it has passed two elements that have a solid:
-    a link whose parent is a joint, and a joint whose parent is a link. From then on it ends before the first element with another tag than
-    A. Neither condition applies to A, its siblings and elements directly below the root: they are never one of the two elements, and the
-    search never ends before them.
+    For each element A, a search descends the tree from A and from each sibling of A. The elements that it reaches are neighbours of A (also
+    A itself, as a set of one index). `bearing`: the elements that have a solid. A branch of the search has two phases:
+    1. It descends until it has passed two elements of `bearing`: a <link> with a <joint> as parent, and a <joint> with a <link> as parent.
+    2. Then it continues as long as the elements have the tag of A. It ends before the first element with the other tag.
+    A, its siblings and the elements directly below the root are exceptions: in phase 1 they do not count, and in phase 2 the search does
+    not end before them.
     """
     children: dict[int, list[int]] = {}
     for index, element in enumerate(elements):
@@ -154,11 +156,12 @@ def _passed(
 
 
 def recorded_neighbours(elements: Sequence[Element], bearing: Collection[int]) -> set[frozenset[int]]:
-    """Return the pairs of neighbours in the tree by the rule "recorded_2014", as indices of elements.
+    """Return the pairs of neighbours in the tree by the rule "recorded_2014", as sets of two indices of elements.
 
-    `bearing`: the elements that have a solid, for pairs of solids, or a field, for pairs of fields. For each element A, a search descends
-    the tree from A and from each sibling of A; the elements that it reaches are neighbours of A. A branch of the search ends after it has
-    reached one link and one joint that are in `bearing`; A itself does not count.
+    This rule is the project's earlier interpretation of the rule of the program published in 2014. For each element A, a search descends
+    the tree from A and from each sibling of A. The elements that it reaches, and the siblings, are neighbours of A. `bearing`: the elements
+    that have a solid (to find pairs of solids), or a field (to find pairs of fields). A branch of the search continues until it has met a
+    <link> and a <joint> that are in `bearing`, in either order. A itself does not count.
     """
     children: dict[int, list[int]] = {}
     for index, element in enumerate(elements):

@@ -24,7 +24,7 @@ class Drive:
 
 
 def drives_of(robot: Robot) -> tuple[Drive, ...]:
-    """Return the drive of every joint, in the order of the joints; raises InvalidValue for a joint that no motor or several drive."""
+    """Return the drive of every joint, in the order of the joints; raises InvalidValue if a joint has no motor or several motors."""
     drives: dict[int, Drive] = {}
     for column, motor in enumerate(robot.motor_table):
         for index, scale, offset in motor.joints:

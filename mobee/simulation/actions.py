@@ -135,7 +135,7 @@ class ReachesUnderWay:
 
     @property
     def reaching(self) -> tuple[str, ...]:
-        """The names of the markers on whose hands the targets exert no repulsive force at present.
+        """The names of markers: the hands that carry these markers are not repelled by targets at present.
 
         They are the markers that a force pulls to the target, and the marker named in the attribute `exempt`, if it is not None.
         """
@@ -223,7 +223,10 @@ class ReachesUnderWay:
         self._ended.clear()
 
     def drop(self, part: str) -> None:
-        """Cancel the reach of a part, if there is one: end its force, and discard an outcome that `after` has not returned yet."""
+        """Cancel the reach of a part, if there is one, and end its force.
+
+        If the reach has ended already, its last outcome is discarded, so that the method `after` does not return it.
+        """
         self._settled.pop(part, None)
         if part in self._under_way:
             del self._under_way[part]

@@ -34,9 +34,9 @@ def advance_together(plants: Iterable[OfflinePlant], threads: int = 1) -> list[l
     The results are bit-equal to those of separate calls of `OfflinePlant.advance`, for any number of threads.
 
     Raises:
-        InvalidValue: before any plant moves, for threads that are not valid, an object that is no OfflinePlant, a plant listed twice, a
-            plant without an action in progress, and plants that share a world while a reach is in progress on one of them, or a callback
-            is set (`OfflinePlant.every`).
+        InvalidValue: before any plant moves, if threads are not valid, an object is no OfflinePlant, a plant is listed twice, or no action
+            of a plant is in progress. Also if a plant shares its world with another one and could change it, which is so while a reach of
+            it is in progress, or while it has a callback (`OfflinePlant.every`).
         BatchInterrupted: a plant's state is not finite, or its callback raised an exception; the other plants finish, and the attribute
             `results` of the exception holds the result of each plant, or the exception that ended it.
     """
@@ -58,8 +58,9 @@ def run_together(plants: Iterable[OfflinePlant], ticks: int, threads: int = 1) -
     The results are bit-equal to those of separate calls of `OfflinePlant.run`, for any number of threads.
 
     Raises:
-        InvalidValue: before any plant moves, for ticks or threads that are not valid, an object that is no OfflinePlant, a plant listed
-            twice, and plants that share a world while a reach is in progress on one of them, or a callback is set (`OfflinePlant.every`).
+        InvalidValue: before any plant moves, if ticks or threads are not valid, an object is no OfflinePlant, or a plant is listed twice.
+            Also if a plant shares its world with another one and could change it, which is so while a reach of it is in progress, or while
+            it has a callback (`OfflinePlant.every`).
         BatchInterrupted: a plant's state is not finite, or its callback raised an exception; the other plants finish, and the attribute
             `results` of the exception holds the trace of each plant, or the exception that ended it.
     """

@@ -75,7 +75,9 @@ class MotorParameters:
         return max(1, int(np.ceil(dt / self.substep - 1e-9)))
 
     def of_motors(self, name: str, count: int) -> Array:
-        """Return the parameter `name` for each of `count` motors, (count,).
+        """Return the parameter `name` for each of `count` motors, (count,), as it was given: a common number is repeated.
+
+        The numbers are not converted for motors that slide; `of_robot` does this.
 
         Raises InvalidValue if the parameter is given for another number of motors.
         """
@@ -85,9 +87,10 @@ class MotorParameters:
         return np.array(np.broadcast_to(value, (count,)))
 
     def of_robot(self, name: str, robot: Robot) -> Array:
-        """Return the parameter `name` for each motor of a robot, in the unit of the motor, (n,).
+        """Return the parameter `name` for each motor of a robot, (n,).
 
-        Raises InvalidValue if the parameter is given for another number of motors.
+        Lag and delay are in s. Backlash [rad] and friction [rad/s] are in m and m/s for motors that slide. The encoder noise is in
+        rad for all motors; `Motors.noise` converts it to m. Raises InvalidValue if the parameter is given for another number of motors.
         """
         values = self.of_motors(name, len(robot.motors))
         common = name in ("backlash", "friction") and np.ndim(getattr(self, name)) == 0
@@ -116,7 +119,7 @@ class Braking:
         self._core = core.calls()
 
     def to_velocity(self, wanted: Array, q: Array) -> None:
-        """Change `velocity` by one tick towards `wanted` (n,) rad/s.
+        """Change `velocity` towards `wanted` (n,) rad/s, as far as the motors can accelerate in one tick.
 
         Before that, `wanted` is limited to velocities from which motors at q (n,) rad can stop before their position limits.
         """
@@ -283,7 +286,7 @@ class Motors:
     def move(self, substeps: int, dt: float) -> None:
         """Advance motors and joints by `substeps` substeps of dt [s]; nothing blocks the joints except the hard stops at their limits.
 
-        The commands and the `load` are constant during these substeps.
+        The commands and the `load` (torques from outside, such as gravity) are constant during these substeps.
         """
         self.begin_substeps(dt)
         self._core.move(self.address, substeps, dt)

@@ -196,7 +196,7 @@ class OfflinePlant:
 
     @property
     def reaching(self) -> tuple[str, ...]:
-        """The names of the markers that are reaching at present, or for which `act` was called with `reaching`.
+        """The names of the markers that a force pulls to the target at present, and, during a call of `act`, of its argument `reaching`.
 
         The targets exert no repulsive force on the hands that carry these markers.
         """
@@ -209,7 +209,7 @@ class OfflinePlant:
 
     @property
     def may_edit(self) -> bool:
-        """Whether ticks of this plant can change the world, or the set of markers that are reaching.
+        """Whether ticks of this plant can change the world, or the markers whose hands the targets do not repel (`reaching`).
 
         This is possible while a reach is in progress, or while a callback of `every` is set.
         """
@@ -223,7 +223,10 @@ class OfflinePlant:
 
     @property
     def hash(self) -> str:
-        """The SHA-256 of the encoders (n,) of every tick so far, as little-endian float64; raises InvalidValue unless `hashed` is set."""
+        """The SHA-256 (64 hex digits) of the encoder values (n,) of all ticks so far, as little-endian float64.
+
+        Raises InvalidValue unless the setting `hashed` is True.
+        """
         if self._digest is None:
             raise InvalidValue("this plant keeps no hash: make it with hashed=True")
         return self._digest.hexdigest()
@@ -369,8 +372,9 @@ class OfflinePlant:
     def prepare_batch(self, deepest: Array) -> bool:
         """Prepare the plant for a run that `PlantBatch` starts in the compiled core; return False if Python is needed in its ticks.
 
-        `deepest`: (2,) m, depths of the deepest contacts of solids and of fields; the compiled core raises them when a contact in a tick is
-        deeper, and the caller must keep the array alive. After each run call `conclude`.
+        `deepest`: (2,) m, depths of the deepest contact of solids and of the deepest contact of fields (volumes that cause repulsive
+        forces). The core increases a number when a contact in a tick is deeper. The caller must keep the array alive, and call `conclude`
+        after each run.
         """
         if self._digest is not None or self._callback is not None or self._reaches.exempt or self._runner.needs_python:
             return False

@@ -68,7 +68,8 @@ class Trace:
     def of(cls, record: Array) -> Trace:
         """Make a trace from the array (ticks, 3 n + 2) that the compiled core has written, a row per tick.
 
-        Columns: n encoders, n true positions, n velocities, and the depths of the deepest contacts of solids and of fields, as in `Trace`.
+        Columns: n encoders, n true positions, n velocities, the depth [m] of the deepest contact of solids, and that of the deepest contact
+        of fields (volumes that cause repulsive forces), as in `Trace`.
         """
         n = (record.shape[1] - 2) // 3
         return cls(record[:, :n], record[:, n : 2 * n], record[:, 2 * n : 3 * n], record[:, 3 * n], record[:, 3 * n + 1])

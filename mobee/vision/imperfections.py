@@ -44,7 +44,8 @@ class CameraSettings(Settings):
         lens: lens of every camera.
         exposure: s, time during which a picture collects light: motion within it is blurred.
         samples: number of renderings whose mean is the picture, each at another time of the exposure and another place within the pixels.
-        gain: factor on the signal; the exposure is adapted such that the brightness is the same, so a gain of 2 collects half of the light.
+        gain: factor on the signal. The brightness of a picture does not depend on it: the light is assumed to be weaker by this factor, so
+            at a gain of 2 a pixel collects half of the electrons, and the picture has more noise.
         full_well: electrons of a white pixel at gain 1; their number has shot noise.
         read_noise: standard deviation of the readout, electrons.
         latency: s from the middle of the exposure to the arrival of the picture, as the driver assumes it for the time stamp.
@@ -185,10 +186,11 @@ class Sensor:
         return View(rotation.T * UPWARDS, np.array([left, -top]), self._scale, self._width, self._height, position)
 
     def pixels(self, sample: int) -> Pixels:
-        """Return for each pixel of the picture, row by row, the pixel of the sample's `view` that it shows: height * width selected pixels.
+        """Return the selection of pixels of a sample's rendering from which the distorted picture is made.
 
-        The view has no distortion; the selection of its pixels distorts the picture as the lens does. `sample`: number of the sample (one
-        of the renderings of which the picture is the mean), from 0.
+        The rendering (see `view`) has no distortion. For each pixel of the picture, row by row, one pixel of the rendering is selected: the
+        one that the lens maps to it. So height * width pixels are selected, some perhaps several times. `sample`: number of the sample
+        (one of the renderings of which the picture is the mean), from 0.
         """
         return self._pixels[sample]
 
@@ -232,9 +234,9 @@ class Cameras:
     def expose(self, name: str, postures: Sequence[Array]) -> Picture:
         """Return the picture of a camera (height, width, 3), bytes red, green, blue; `name`: name of the camera.
 
-        `postures`: positions of all motors (n,) rad in the simulation, at each of the `moments`. The offsets of the encoders,
-        `errors.encoders` (n,) rad, are added to these positions before the robot is drawn. So the picture shows the head at a posture that
-        differs from the simulated one.
+        `postures`: positions of all motors (n,) rad in the simulation, one array for each of the `moments` (times during the exposure). The
+        offsets of the encoders, `errors.encoders` (n,) rad, are added to these positions before the robot is drawn. So the picture shows
+        the head at a posture that differs from the simulated one.
         """
         camera, scene = self._scene.cameras[name], self._scene
         light = np.zeros((self.settings.height * self.settings.width, 3), np.float32)

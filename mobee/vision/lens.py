@@ -197,6 +197,10 @@ def camera_frames(camera: Camera, transforms: Array, mount: Array) -> tuple[Arra
 
 
 def into(position: Array, rotation: Array, points: Array) -> Array:
-    """Transform points (..., 3) m from the root frame into a frame at `position` (..., 3) m with `rotation` (..., 3, 3)."""
+    """Transform points (..., 3) m from the root frame into another frame; return their coordinates (..., 3) m in it.
+
+    `position` (..., 3) m: origin of the frame, in the root frame. `rotation` (..., 3, 3): its columns are the frame's axes in the root
+    frame.
+    """
     found: Array = np.einsum("...ji,...j->...i", rotation, points - position)
     return found

@@ -20,10 +20,11 @@ AXES = ("x", "y", "z", "turn_x", "turn_y", "turn_z")  # of a mount
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rig:
-    """The cameras of a robot before calibration; `names` is the order of the parameters that a calibration estimates.
+    """The cameras of a robot before calibration, and its tag.
 
-    `cameras`: by name, with their poses in the kinematic model of the robot. `lens`: lens of all cameras. `tag`: the AprilTag on a
-    palm; None: the robot has no tag.
+    The property `names` has the names of the parameters that a calibration estimates, in their order. `cameras`: by name,
+    with their poses in the kinematic model of the robot. `lens`: lens of all cameras. `tag`: the AprilTag on a palm; None: the robot has
+    no tag.
     """
 
     robot: Robot
@@ -123,7 +124,7 @@ def see_points(rig: Rig, camera: str, x: Array, q: Array, dq: Array, points: Arr
 
 
 def see_tag(rig: Rig, camera: str, x: Array, q: Array, dq: Array) -> Seen:
-    """Predict the pixels of the four corners of the tag on the hand, in K pictures of a camera.
+    """Predict the pixels of the four corners of the tag on the hand, in K pictures of a camera, in the order of `Tag.corners`.
 
     `x`: (P,) the calibration's parameters. `q` (K, n) rad and `dq` (K, n) rad/s: encoders and velocities at the time stamp of each picture.
     """

@@ -97,9 +97,9 @@ def streams(player: Player, part: str) -> None:
 
 
 def ticks(player: Player, part: str) -> None:
-    """Record the ticks for 1.5 s, and test their numbers, times and rate by the contract; raises Broken if one of them is wrong.
+    """Test the tick messages of 1.5 s: numbers that increase, times that fit the numbers, few missing ticks, and the stated rate.
 
-    `part`: not used.
+    Raises Broken if a rule is violated, for example if more than 10 % of the ticks are missing or if the run changes. `part`: not used.
     """
     first = len(player.ticks)
     player.wait(OBSERVED)

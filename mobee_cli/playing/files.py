@@ -77,7 +77,10 @@ def _scenario(setup: Setup, files: Files) -> str:
 
 
 def write_readme(setup: Setup, files: Files) -> None:
-    """Write a README.md beside the files. It says what each file is for and what the user can edit."""
+    """Write README.md into the folder of the files of a setup (a robot with its agents).
+
+    It explains the purpose of each file, what the user can edit, and what was derived for the agents.
+    """
     robot, scenario, store = (path.name for path in (files.robot, files.scenario, files.store))
     own = f"- `{robot}`: the robot. Edit parts, limits, home, fields and pairs, then run `mobee check {robot}`.\n"
     derived = "\n".join(setup.lines)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Forwards calls, part metadata, emergency stops and the router's liveliness token between robot_sim and its clients.
+"""Forwards calls, part metadata, emergency stops and the sign that the router runs between robot_sim and its clients.
 
-The port filter is a process between them; it moves the robot back if a motion leads into contact.
+This sign is the router's liveliness token. The port filter is a process between robot_sim and the clients; it moves the robot back if a motion leads into contact.
 """
 
 from __future__ import annotations

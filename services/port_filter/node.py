@@ -49,7 +49,11 @@ class Switch:
         self.reflex = Reflex(self._settings, dt, self._max_velocity)
 
     def tick(self, q: Array) -> Array | None:
-        """Check the measured pose `q` (n,) rad. Returns the reflex's target (n,) rad; None while the clients command the robot."""
+        """Check the measured pose `q` (n,) rad for contacts and violated limits, and advance the reflex by one tick.
+
+        Returns the target (n,) rad of the reflex, which moves the robot back along its past poses after a violation; None while the clients
+        command the robot.
+        """
         self.q = q
         self.violations = self._watch.check(self._track.evaluate(q))
         return self.reflex.tick(q, self.violations)

@@ -50,8 +50,9 @@ MAX_REMEMBERED = 1000  # commands in transit, at most
 
 
 class CommandStream:
-    """Publishes the commands of one part to robot_sim; commands of clients and of the reflex are numbered in one common sequence.
+    """Publishes the commands of one part to robot_sim, and numbers those of clients and of the reflex in one common sequence.
 
+    The reflex moves the robot back along its past poses when a motion leads into contact.
     For each command of a client it remembers the number that the client gave to the command.
     """
 
@@ -93,7 +94,8 @@ class Streams:
 
     `commands`: dict from a part to its stream of commands to robot_sim. `is_stale`: True if the newest state of a part is more than 0.1 s
     older than the tick; the pose is then not checked for contacts and limits, and commands are refused. `answered`: function that is called
-    with the message and the answer when, in lockstep, a client's `Commands` message also contains its answer to a tick.
+    with a client's `Commands` message and the answer in it. Such an answer reports, in lockstep (every tick waits for all participants),
+    that the client has finished a tick.
     """
 
     def __init__(

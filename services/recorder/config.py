@@ -22,8 +22,8 @@ class Config(ServiceConfig, frozen=True, kw_only=True):
     pose_rate: Annotated[float, Meta(ge=0, le=100)] = 10.0
     """Rate [Hz] of joint states and link transforms as ROS 2 messages, which are recorded for viewers; 0: none."""
     json_rate: Annotated[float, Meta(ge=0, le=100)] = 2.0
-    """Largest rate [Hz], for each key, of copies in JSON, which are recorded for viewers; 0: none. The messages themselves are all
-    recorded."""
+    """Largest rate [Hz], for each key, of copies in JSON, which are recorded for viewers. Single events, such as emergency stops, are
+    always copied; 0: only these. The messages themselves are all recorded."""
     everything: bool = False
     """Whether to record also the streams that are published only if someone subscribes: clock, states of single parts, poses, contacts,
     pictures."""

@@ -52,7 +52,10 @@ class Recording:
         return found
 
     def __iter__(self) -> Iterator[Raw]:
-        """Yield all messages, and liveliness tokens (key `alive`), in the order of arrival, without the copies for viewers."""
+        """Yield all messages, and liveliness tokens (signs that services run; key `alive`), in the order of arrival.
+
+        The copies in JSON and ROS 2 formats, which the recorder adds for viewers such as Foxglove, are left out.
+        """
         for path in self.files:
             channels: dict[int, Channel] = {}
             with path.open("rb") as file:

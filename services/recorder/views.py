@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Makes copies of messages for viewers, at a bounded rate: JSON of every key, motors as JointState, links as transforms."""
+"""Makes copies of messages for viewers: in JSON, and the robot's pose as ROS 2 messages (motors as JointState, links as transforms).
+
+The rate of the copies is limited, except for single events, such as emergency stops. Pictures and learned data have no copies in JSON.
+"""
 
 from __future__ import annotations
 

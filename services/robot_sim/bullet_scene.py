@@ -106,7 +106,7 @@ class BulletScene:
             self.client.resetJointState(self.body, joint, position)
 
     def motion(self, q: Array) -> Motion:
-        """Return the equation of motion of the joints in `motors`, at their present velocities.
+        """Return the equation of motion of the joints that PyBullet moves, at their present velocities, in the order of the field `motors`.
 
         `q`: (n,) rad, positions of all motors of the robot.
         """

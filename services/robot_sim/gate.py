@@ -193,7 +193,10 @@ def _all(found: NDArray[np.bool_]) -> bool:
 
 
 class Shaper:
-    """Limits the references of a part to the limits of its motors, tick by tick; all arrays have the shape (n_part,)."""
+    """Limits the reference positions or velocities of a part by the limits of its motors (position, velocity, acceleration), tick by tick.
+
+    All arrays have the shape (n_part,).
+    """
 
     def __init__(self, limits: Limits, dt: float) -> None:
         self._limits = limits
@@ -385,7 +388,7 @@ class Gate:
             self._enter("fault", why)
 
     def admit(self, order: Order, k: int, now: int, q: Array) -> None:
-        """Accept an order, which the part follows from the next tick on; raise Refused with the reason if it is not admitted.
+        """Accept a command (`order`), which the part follows from the next tick on; raise Refused with the reason if it is not admitted.
 
         `k`: the present tick. `now`: time, ns of the monotonic clock. `q`: measured positions of the part's motors, (n_part,) rad.
         """

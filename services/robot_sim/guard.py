@@ -38,7 +38,8 @@ class Guard:
         """Make the gates; an emergency stop in the record is in force from the beginning.
 
         `dt`: the tick, s. `record`: the file that keeps emergency stops; None: a stop ends with this process. `speed`: simulated seconds
-        per second of real time. `datagrams`: receives stops without the router; None: only bus and record do.
+        per second of real time. `datagrams`: receives stops as UDP datagrams, without the router; None: stops come only
+        by the bus and by the record.
         """
         self._service, self._robot, self._backend, self._dt, self._record = service, robot, backend, dt, record
         self._datagrams, self._speed = datagrams, speed
@@ -86,7 +87,8 @@ class Guard:
     def tick(self, k: int) -> None:
         """Command all motors in tick k: a part follows its present command, or brakes and stands still if it has none.
 
-        Before that, the method checks for a new emergency stop and, if not in lockstep, checks and admits the newest `Commands` message.
+        Before that, the method checks for a new emergency stop. Then it checks and admits the newest `Commands` message, except in lockstep
+        (every tick waits for all participants), in which `admit_waiting` does this.
         """
         self._check_stop()  # before commands, and past an inbox that a flood has filled
         now = time.monotonic_ns()

@@ -31,7 +31,7 @@ class Lockstep:
         self._began = self._answered = 0.0  # monotonic clock: tick 1, the last tick
 
     def begin(self) -> None:
-        """Begin a new run: no participant has answered yet, and the count of flaws is 0."""
+        """Begin a new run: no participant has answered yet, and the count of flaws (events that made the run unrepeatable) is 0."""
         self._barrier.begin()
         self.flaws, self._reported = 0, -EVENT_PERIOD
 

@@ -49,10 +49,10 @@ class ImperfectCameras:
         on_truth: Callable[[], None],
         on_encoders: Callable[[], None],
     ) -> None:
-        """Subscribe to the truth and the ticks.
+        """Subscribe to the messages `sim/truth` (true postures) and `tick` (encoder values).
 
-        `seed`: of the noise in stamps and pictures. `on_truth`, `on_encoders`: called after each new message with the truth, or with the
-        encoders.
+        `seed`: of the noise in stamps and pictures. `on_truth`: called after each `sim/truth` message. `on_encoders`: called after each
+        `tick` message.
         """
         self.settings, self.errors = settings, errors
         self._scene, self._bus = scene, service.bus

@@ -28,7 +28,7 @@ class Phases:
     """The times within each tick at which the parts are sampled: a fixed phase for each part plus jitter; both are drawn with a seed."""
 
     def __init__(self, parts: Sequence[str], jitter: float, seed: int) -> None:
-        """`jitter`: standard deviation of the jitter, as a share of a tick."""
+        """Draw the fixed phase of each part. `jitter`: standard deviation of the random change of a sampling time, as a share of a tick."""
         self._parts, self._jitter = tuple(parts), jitter
         self._rng = np.random.default_rng([seed, 0x706861])
         self._phases = self._rng.uniform(0.0, PHASE_RANGE, len(parts))

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Measures the physics tick by tick: counts contacts and stops of parts, publishes `sim/truth` (the true state), writes files."""
+"""Measures the physics tick by tick: counts contacts and stops of parts, publishes `sim/truth` (the true state).
+
+With the setting `record` it also writes the true joint positions and the contacts of every tick to files.
+"""
 
 from __future__ import annotations
 
@@ -137,7 +140,8 @@ class Counters:
     def numbers(self, missed: int, pairs_watched: int) -> Mapping[str, float]:
         """Return the counts for `stat`, by name.
 
-        Names with "ticks" are numbers of ticks. "age_...": age of commands [ticks], as in `age_at`. "solid_depth_max" and "gap_min":
+        Names with "ticks" are numbers of ticks. "age_...": age of the oldest command [ticks], as `age_at` returns
+        it: ticks since the tick from whose state the command was computed. "solid_depth_max" and "gap_min":
         deepest contact and smallest distance [m]. "stops": number of stops, "stop_time_max" and "stop_distance_max": their largest time [s]
         and distance [rad]. "overtime_ms_...": delay of a tick's start after its deadline [ms]. "tick_ms_...": computing time of a tick
         [ms]. `missed`: number of ticks skipped since the start of the process. `pairs_watched`: number of pairs that the simulator tests
@@ -255,7 +259,7 @@ class Watch:
     """
 
     def __init__(self, bus: Bus, robot: Robot, backend: Backend, guard: Guard, truth_period: int) -> None:
-        """`truth_period`: number of ticks between two messages of the truth."""
+        """Begin with all counts at 0. `truth_period`: number of ticks between two `sim/truth` messages (true state of the simulation)."""
         self._bus, self._robot, self._backend, self._guard = bus, robot, backend, guard
         self._truth = bus.publisher(Truth)
         self._truth_period = truth_period

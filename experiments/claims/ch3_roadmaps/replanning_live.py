@@ -197,7 +197,10 @@ class Crosser:
             raise MobeeError(f"the ball cannot be changed: {answer}")
 
     def _tick(self, k: int) -> None:
-        """Count ticks from the first one after the answer to the first request, and make the ball solid at its time."""
+        """Make the ball solid when tick `k` is `after` s (see `cross`) later than the first tick of the crossing.
+
+        The first tick is the first one whose forces are received during the crossing.  Called with each tick whose forces are received.
+        """
         if self._after >= 0.0 and not self.motions:
             self._solid_at, self._after = k + round(self._after * RATE), -1.0
         if 0 <= self._solid_at <= k:

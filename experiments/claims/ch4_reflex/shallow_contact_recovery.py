@@ -220,7 +220,8 @@ class Trial:
 
         It succeeds if four conditions hold.  The hand has no contact at the end of the recovery or of the trial.  It did not touch again
         after a contact had ended.  While it moved back, it was at most 1 mm deeper in contact than while it stopped.  The next reflex does
-        not start within 0.3 s (RELAPSE_TIME).  The first three are judged by the true positions.  Without a reflex it is False.
+        not start within 0.3 s (RELAPSE_TIME) after the client has got control back.  The first three are judged by the true positions.
+        Without a reflex it is False.
         """
         return self.reflexes > 0 and not (self.came_back or self.never or self.deeper or self.relapse)
 
@@ -313,7 +314,11 @@ class _Body:
 
 
 def _switch(table: Table, client: Client, body: _Body, truth: Truth, settings: ReflexSettings | None) -> Control:
-    """Run MoBeE 1.0, or no reflex: position commands are forwarded or replaced."""
+    """Run the client for 12 s with the reflex of MoBeE 1.0; if `settings` is None, without a reflex.
+
+    While the reflex has control, the motors follow its target positions, else those of the client.  Each tick is recorded in `truth`.
+    Returns the ticks at which the control changed between client and reflex.
+    """
     limit = np.full(len(table.robot.motors), UNLIMITED)
     if settings is not None and settings.brake:
         limit = np.array([motor.max_velocity for motor in table.robot.motor_table])

@@ -108,7 +108,11 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 def _shown_balls(
     found: Calibration, settings: CameraSettings, errors: CameraErrors, model: Model, places: int, seed: int
 ) -> dict[str, Any]:
-    """Show balls until so many were located; returns errors before and after (N,) m, normalised errors (N,), pixel errors and counts."""
+    """Show a ball at random places until its position was computed `places` times, at most 3 `places` times.
+
+    Keys: "before", "after" and "normalised", as in `trial`; "pixel_error", rms error of the ball's middle in the pictures [px]; "shown",
+    number of shown balls; "sighted", number of those that were found in the pictures of both cameras.
+    """
     robot, rng = rig().robot, np.random.default_rng([seed, 0x62616C6C])
     scene = Scene(robot, load_world("table"), rig().cameras, around=[*room(seed), *clutter(model.world.objects.values(), seed)])
     cameras = Cameras(scene, settings, errors, seed)

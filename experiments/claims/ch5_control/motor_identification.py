@@ -217,7 +217,10 @@ def _trajectory(tick: Callable[[], Array], controller: Controller, targets: Arra
 
 
 def _difference(course: Array) -> dict[str, float]:
-    """Summarise differences (actions, ticks, n_part) rad, in degrees."""
+    """Summarise differences between two motions of the arm in a dict of the four numbers [deg] that `reproduce` describes.
+
+    `course`: differences of the encoder values, (actions, ticks, n_part) rad.  Only the first 7 motors count, because the fingers rest.
+    """
     moved = np.rad2deg(course[..., WRIST])
     ends = np.abs(moved[:, -20:].mean(axis=1))  # a mean, to average out the encoder noise
     return {

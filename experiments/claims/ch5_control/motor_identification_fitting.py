@@ -113,7 +113,10 @@ class _Problem:
         self._sparsity = csr_array((ones, (rows.repeat(len(SHAPED)), columns.ravel())))  # a motor's rows depend on its own numbers
 
     def solve(self, delay: float, start: Array) -> Array:
-        """Solve least squares at this delay from a start (n, 3) in SCALE; returns the same shape."""
+        """Fit lag, backlash and friction of all motors at a fixed delay [s] by least squares; returns them, (n, 3).
+
+        They are at least 0, and in units of SCALE, as is their start value `start` (n, 3).
+        """
         motors = len(self._measured)
         found = least_squares(
             lambda x: self.residuals(delay, x.reshape(motors, -1)).ravel(),
@@ -127,7 +130,11 @@ class _Problem:
         return x
 
     def residuals(self, delay: float | Array, x: Array) -> Array:
-        """Return the residuals (n, ticks) in standard deviations of the noise."""
+        """Return the response of the motor model minus the measured mean response, (n, ticks), in standard deviations of the noise.
+
+        The ticks of the preload at the beginning are left out.  `delay`: of all motors, or (n,), s.  `x`: (n, 3), lag, backlash and
+        friction in units of SCALE.
+        """
         predicted = _centred(respond(self._robot, _parameters(x, delay), self._signal)) / self._sigma[:, None]
         difference: Array = predicted - self._measured
         return difference
@@ -151,7 +158,11 @@ def _both(responses: Responses) -> tuple[Array, Array]:
 
 
 def _best(problem: _Problem, motors: int) -> tuple[Array, Array, Array, Array]:
-    """Return the best delay of each motor: x (n, 3), delay (n,) s, sum of squares (n,), deviation of the delay (n,) s."""
+    """Fit the motors at every delay up to LONGEST, and select for each motor the delay with the smallest sum of squared residuals.
+
+    Returns four arrays: x (n, 3), the fitted lag, backlash and friction in units of SCALE; the delay (n,) s; the sum of squares (n,); and
+    the standard deviation of the delay (n,) s.  `motors`: their number n.
+    """
     delays = np.arange(0.0, LONGEST + 1e-9, _substep())
     x = np.tile(START, (motors, 1))
     found, squares = [], []
@@ -174,14 +185,21 @@ def _substep() -> float:
 
 
 def _centred(q: Array) -> Array:
-    """Return responses without the preload and their mean, (n, ticks)."""
+    """Return the responses `q` (n, ticks) without the first 60 ticks (PRELOAD), each minus its mean over the remaining ticks.
+
+    The signal takes up the play of the motor in the first ticks, which are not fitted.
+    """
     kept = q[:, PRELOAD:]
     centred: Array = kept - kept.mean(axis=1, keepdims=True)
     return centred
 
 
 def _noise(*responses: Array) -> float:
-    """Return the standard deviation of repetitions around their mean in a posture, rad, each without its own mean."""
+    """Return the standard deviation of a motor's encoder noise at one tick [rad], estimated from repeated responses.
+
+    First the mean over the ticks is subtracted from each repetition, then the mean response of all repetitions in the same posture.
+    `responses`: arrays (postures, repetitions, ticks) rad.  The ticks of the preload at the beginning are left out.
+    """
     squares, freedom = 0.0, 0
     for each in responses:
         kept = each[:, :, PRELOAD:]
@@ -193,7 +211,11 @@ def _noise(*responses: Array) -> float:
 
 
 def _delay_deviation(squares: Array, best: Array) -> Array:
-    """Return the deviations of the delays, (n,) s, from the curvature of chi-square over the grid of delays."""
+    """Return the standard deviation of the fitted delay of each motor, (n,) s.
+
+    It follows from the second difference of chi-square between neighbouring delays.  `squares`: sum of squared residuals (delays, n).
+    `best`: index of the best delay of each motor, (n,).
+    """
     motors, middle = np.arange(squares.shape[1]), best.clip(1, len(squares) - 2)
     curvature = squares[middle - 1, motors] + squares[middle + 1, motors] - 2.0 * squares[middle, motors]
     deviation: Array = _substep() * np.sqrt(2.0 / curvature)

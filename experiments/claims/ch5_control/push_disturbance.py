@@ -156,7 +156,10 @@ def findings(found: Cells) -> dict[str, Any]:
 
 
 def _summary(pushes: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Summarise the pushes of one law and direction."""
+    """Return the numbers that `findings` describes, for the pushes with one control law in one direction.
+
+    `pushes`: results of `push_hand`, in the order of increasing force.
+    """
 
     def least(name: str) -> float | None:
         return next((one["force"] for one in pushes if one[name] > 0.0), None)
@@ -171,7 +174,7 @@ def _summary(pushes: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 
 def _pushes(found: Cells) -> dict[tuple[str, str], list[dict[str, Any]]]:
-    """Return the pushes of each law and direction, by force."""
+    """Return a dict from (control law, direction) to the results of `push_hand`, sorted by force; pairs without results are absent."""
     groups = grouped_by(found, "law", "direction")
     keys = (key for key in product(LAWS, DIRECTIONS) if key in groups)
     return {key: sorted(groups[key], key=lambda one: float(one["force"])) for key in keys}

@@ -96,7 +96,11 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def _posture_step(gains: str, number: int, seed: int) -> tuple[Array, Array]:
-    """Return the previous posture, or home, and a posture; motors that the gain set never moves stay at home."""
+    """Return the start and the goal of a step of many motors, each (n,) rad: two successive postures of a random sequence.
+
+    `number`: index of the goal in the sequence; the step 0 starts at home.  `seed`: of the sequence.  Motors that the gain set never moves
+    (weight 0) stay at home.
+    """
     home, moving = icub().robot.home, Gains.named(gains).weight(icub().robot.motors) > 0
     before, after = (_posture(n, seed) if n >= 0 else home for n in (number - 1, number))
     return np.where(moving, before, home), np.where(moving, after, home)

@@ -294,7 +294,12 @@ def findings(found: Cells) -> dict[str, Any]:
 
 
 def _above(number: Number, control: Number, rival: str, text: str) -> Rule:
-    """Return the rule that a number of the curious agent is above 1, and above the rival's control, with both changes."""
+    """Return a rule: a number of the curious agent's runs is above 1 and above a number of the rival's runs, for both changes of the world.
+
+    Neither agent forgets.  `number`, `control`: functions that compute the number from a run of the curious agent and of the rival.
+    `rival`: explorer of the rival; if it is "curious", two numbers of the same runs are compared.  `text`: format for the change and both
+    numbers.
+    """
 
     def of_runs(runs: Runs) -> Measured:
         parts, holds = list[str](), list[bool | None]()
@@ -402,7 +407,10 @@ def _curves(panels: Any, runs: list[Run], style: tuple[str, str], label: str) ->
 
 
 def _smooth(rate: Array) -> Array:
-    """Return means over the last four checks."""
+    """Return the moving mean of `rate` (checks,) over each check of the model and the three before it, (checks,).
+
+    Before the first check, the first value is repeated.
+    """
     padded = np.concatenate([np.full(3, rate[0]), rate])
     return np.convolve(padded, np.full(4, 0.25), mode="valid")
 

@@ -163,7 +163,7 @@ Laws = Mapping[str, Groups]
 
 
 def groups(found: Cells) -> Laws:
-    """Group the finished runs by law, and those of a law by (prior, discount); each group is sorted by seed."""
+    """Return a dict from the control law, one of `LAWS`, to a dict from (prior, discount) to the finished runs, sorted by seed."""
 
     def of(result: CellResult) -> Run:
         visits, failures, tries = (result.values[name].astype(np.intp) for name in ("visits", "failures", "tries"))
@@ -290,7 +290,11 @@ _TRIES = "tries over the mean of all actions: "
 
 
 def _by_discount(number: Callable[[Run], float], least: float, most: float, grouped: Groups) -> Measured:
-    """Judge whether tries stand out at the smallest discount, and grow from there to the largest."""
+    """Judge how often some actions are tried, relative to the mean of all actions, in the runs with the prior 50-50.
+
+    Two conditions must hold: at the smallest discount this number is between `least` and `most`, and at the largest discount it is larger
+    than at the smallest.  `number`: function that computes it from a run.
+    """
     values = _with_prior(grouped, "50-50", number)
     first, *_, last = values.values()
     return _TRIES + texts(values, form="{1} at discount {0}"), all_hold([decides(interval(first), least, most), is_above(last, first)])
@@ -388,7 +392,11 @@ def plot(found: Cells) -> Any:
 
 
 def _bars(axes: Any, runs: list[Run], given: Sequence[Any]) -> None:
-    """Draw a bar for each state-action, by source state, and mark the hard states and the failing actions."""
+    """Draw a bar for each state-action, in the order of the source states; the values of the runs are stacked in it.
+
+    The actions from the states 24, 51 and 78 (HARD) have a grey background, and the actions in FAILING a mark.  `given`: for each run an
+    array (81, 8) of tries or values.
+    """
     exists = runs[0].exists
     number = np.cumsum(exists.ravel()).reshape(exists.shape) - 1
     heights = draw_stacked_bars(axes, [values[exists].astype(float) for values in given])

@@ -110,7 +110,10 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def _places(arrangement: Arrangement, seed: int, transitions: int) -> list[Array | None]:
-    """Return the places of the cup before the first action of a curious agent that perceives it, and after each."""
+    """Return the true places of the cup, (3,) m in the root frame, before the first action of a curious agent and after each action.
+
+    A place is None after the cup fell, until it is put back.  The agent perceives the cup.  `transitions`: number of actions.
+    """
     stage = Stage(arrangement, seed, "curious")
     places = [stage.cup.place]
     for _ in range(transitions):
@@ -215,7 +218,10 @@ def plot(found: Cells) -> Any:
 
 
 def _windows(moved: Array) -> Array:
-    """Return the share of actions that moved the cup in each window of actions."""
+    """Return the share of actions that moved the cup in each of several equal parts of a run, (parts,).
+
+    `moved` (T,): whether each action moved the cup.  A part has at least WINDOW actions, or the whole run if it is shorter.
+    """
     parts = max(1, len(moved) // WINDOW)
     means: Array = np.array([part.mean() for part in np.array_split(moved, parts)])
     return means

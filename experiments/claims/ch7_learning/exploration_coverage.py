@@ -299,7 +299,10 @@ def novel(published: Published) -> Measured:
 
 
 def _more_states(runs: Runs, published: Published) -> Measured:
-    """Judge whether the curious agent has visited more states; it has not, if the difference is less than a state."""
+    """Judge whether the curious agent visits more states than the least-tried agent in the first 220 transitions, with constraints.
+
+    If neither is significantly ahead, and the difference is surely less than one state, the outcome is False.
+    """
     curious, least = ([states_seen(run, EARLY) for run in group] for group in (runs, published["constrained", "least_tried"]))
     text = f"of 81 states visited: curious {estimate(curious, 1)}, least tried {estimate(least, 1)}"
     found = is_above(curious, least)
@@ -402,7 +405,10 @@ def _states(axes: Any, group: Mapping[str, Runs]) -> None:
 
 
 def _detours(axes: Any, group: Mapping[tuple[str, ...], Runs]) -> None:
-    """Draw a dot for each run: how much longer it was than the shortest walk."""
+    """Draw a dot for each run: by how many percent its number of transitions exceeds that of the shortest walk.
+
+    The number is that until every action was tried.  `group`: runs on one graph, by (world, agent).
+    """
     names = [name for name in COLORS if any(key[1] == name for key in group)]
     for shift, (world, marker) in zip((-0.12, 0.12), (("constrained", "o"), ("free", "^")), strict=True):
         for place, name in enumerate(names):

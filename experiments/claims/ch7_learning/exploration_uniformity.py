@@ -88,12 +88,19 @@ def _of_graph(grouped: Groups, graph: str) -> dict[str, list[Explored]]:
 
 
 def _spikes(grouped: Groups, graph: str, explorer: str) -> list[float]:
-    """Return for each run the mean tries of actions at constraints, as the other runs found them, over those of other actions."""
+    """Return for each run of an explorer the mean tries of actions at constraints, divided by the mean tries of all other actions.
+
+    An action is at a constraint if it failed in more than half of its tries in all other runs on the graph, by any explorer.  Runs without
+    a finite ratio are left out.
+    """
     return relative_tries_of(grouped[graph, explorer], sum(_of_graph(grouped, graph).values(), []))
 
 
 def _more_uniform(what: str, number: Callable[[Explored], float], grouped: Groups) -> Measured:
-    """Judge whether the mean of the curious agent is below those of the others."""
+    """Judge whether a measure of unevenness is lower for the curious agent than for the other explorers, on the graph "nearest".
+
+    `number`: function that computes the measure from a run; its means over the runs are compared.  `what`: its name in the text.
+    """
     values = of_each(_of_graph(grouped, "nearest"), number)
     return f"{what}: {texts(values)}", stands_below(values, "curious")
 
@@ -115,7 +122,11 @@ tries = Claim(
 
 
 def _of_spikes(rule: Rule) -> Rule:
-    """Return a rule on each explorer's ratio of mean tries: actions that run into constraints over others; open if no action fails."""
+    """Decorator: turn a rule about ratios of tries into a rule about the grouped runs.
+
+    `rule` gets a dict from the explorer to one ratio for each run: the mean tries of actions that run into constraints (that fail in more
+    than half of their tries) over those of other actions.  If an explorer has no ratio, the outcome is None (not decided).
+    """
 
     def of_runs(grouped: Groups) -> Measured | None:
         spikes = {explorer: _spikes(grouped, "nearest", explorer) for explorer in EXPLORERS}

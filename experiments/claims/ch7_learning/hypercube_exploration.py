@@ -89,7 +89,10 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def _values(agent: CuriousAgent) -> Array:
-    """Return the values of the actions, with a smaller tolerance than the agent's own."""
+    """Return the values of all actions (S, A) nats under the agent's model, by value iteration with a tolerance of 1e-9 nats.
+
+    The tolerance of the agent's own plans is larger.
+    """
     return value_iteration(agent.model, agent.model.reward, agent.discount, TOLERANCE)[1]
 
 
@@ -154,7 +157,11 @@ def flat(priors: Priors) -> Measured:
 
 
 def _proportional(groups: Groups) -> Measured:
-    """Judge whether the values grow with the discount, and in proportion to it; their limit, mean reward / (1 - discount), grows faster."""
+    """Judge two meanings of "proportional to the discount", for the mean value of the actions at the largest and the smallest discount.
+
+    First, the value at the largest discount is larger.  Second, the ratio of both values differs from the ratio of both discounts by at
+    most one half of the latter.  The text compares the values with their limit, mean reward / (1 - discount), too.
+    """
     values = {discount: [float(run["values"].mean()) for run in runs] for discount, runs in groups.items()}
     shares = [interquartile_mean([_share_of_limit(run, discount) for run in runs]) for discount, runs in groups.items()]
     of_limit = " to ".join(dict.fromkeys(f"{share:.2f}" for share in (min(shares), max(shares))))

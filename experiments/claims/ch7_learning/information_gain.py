@@ -223,7 +223,10 @@ def spikes(grouped: Groups) -> Measured:
 
 
 def _size_ratios(grouped: Groups, divergence: str) -> list[float]:
-    """Return the rewards of the torso's first transitions over those of the arm's, for each seed that both have."""
+    """Return the mean reward of the torso's first 100 transitions divided by that of the arm's, for each seed with which both were run.
+
+    `divergence`: the one that defines the reward, "kail" or "kl".
+    """
     torso, arm = ({run.seed: _early_reward(run) for run in grouped[part, divergence]} for part in ("torso", "left_arm"))
     return [torso[seed] / arm[seed] for seed in sorted(torso.keys() & arm.keys())]
 

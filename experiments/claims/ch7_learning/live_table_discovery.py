@@ -285,7 +285,10 @@ def _equivalent(runs: Runs, number: Callable[[Run], float], margin: float, digit
 
 
 def _of_enough(runs: Runs, text: str, holds: Sequence[bool | None]) -> Measured:
-    """Return text and verdict of all robots; open if one has fewer live runs than an interval needs."""
+    """Return the text and one verdict for all live robots: they must all hold.
+
+    `holds`: the verdict of each robot.  If a robot has fewer than 5 live runs (MIN_SEEDS), the verdict is None (open), as the text states.
+    """
     few = min((len(runs[name]) for name in _live(runs)), default=0)
     return (f"{text} ({few} live runs, too few for a verdict)", None) if few < MIN_SEEDS else (text, all_hold(holds))
 

@@ -236,7 +236,11 @@ def _overall(world: str, found: Last) -> Measured | None:
 
 
 def _ratio(above: Array | None, below: Array | None, least: float, note: str = "") -> Measured | None:
-    """Judge whether the ratio of two errors is at least `least`; open if one is not known, or the interval contains `least`."""
+    """Judge whether the error `above` divided by the error `below` is at least `least`; returns text and verdict.
+
+    `above`, `below`: errors of each run, (seeds,).  `note`: appended to the text.  Returns None if an error is not known (None).  The
+    verdict is None (open) if the confidence interval of the ratio contains `least`.
+    """
     if above is None or below is None:
         return None
     factor = ratio_estimate(above, below).replace(" ", " x ", 1)

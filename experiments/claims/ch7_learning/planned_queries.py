@@ -79,8 +79,8 @@ class FrozenModel:
     def aim(self, q: Array) -> Array | None:
         """Return the pose (4,) rad to which the arm moves next from the pose `q` (4,) rad; it is never None.
 
-        It is the sample of the state to which the planned action in the state of `q` leads if it succeeds.  As in
-        `experiments.kit.learning.arm_planners.Rival.aim`.
+        It is the sample (the pose that represents a state) of the goal state of the planned action, which starts in the state of `q`.  As
+        in `experiments.kit.learning.arm_planners.Rival.aim`.
         """
         state = self._space.state_of(q)
         sample: Array = self._space.samples[self._space.goal(state, int(self.planner.policy[state]))]

@@ -262,7 +262,10 @@ def _row(runs: Sequence[Mapping[str, Any]]) -> Row:
 
 
 def _share(space: Lattice, runs: Sequence[Ints], ends: Mapping[tuple[int, int], int]) -> float:
-    """Return the share of the tries of these actions (source, goal) that ended in the given states; NaN without a try."""
+    """Return the share of all tries of some actions, in all runs together, that ended where expected; NaN if there was no try.
+
+    `runs`: transitions (T, 3) of each run.  `ends`: dict from each of these actions (source, goal) to the state in which a try should end.
+    """
     hits = tries = 0
     for seen in runs:
         for (source, goal), end in ends.items():
@@ -301,7 +304,7 @@ def _changed(each: EachRun, parameter: str) -> dict[str, list[Row]]:
 
 
 def _reproduce(each: EachRun) -> dict[str, str]:
-    """Return in how many runs of each variant both findings are reproduced, as text."""
+    """Return a text for each variant, as "3 of 5": in how many of its runs the published findings on both lattices are reproduced."""
     return {variant: f"{sum(row.both for row in rows)} of {len(rows)}" for variant, rows in each.items()}
 
 
@@ -396,7 +399,7 @@ def plot(found: Cells) -> Any:
 
 
 def _drawn_row(variant: str, row: Row) -> list[tuple[str, str]]:
-    """Return the cells of one row of the drawn table as (text, background colour), in the order of HEADER: the variant, then its numbers."""
+    """Return the cells of one row of the drawn table, (text, background colour), in the order of HEADER: the variant, then its numbers."""
     return [
         (variant, _color(row.both)),
         (f"{row.never:.1f} of {len(NEVER)}", _color(row.never == len(NEVER))),

@@ -30,7 +30,17 @@ from scipy.special import stdtrit
 from experiments.kit.cells import CELL_FILES, Cell, load_cells
 from experiments.kit.command_line import Progress, positive_whole
 from experiments.kit.experiment import OUR_AIM, Experiment, Measured, Steps, claim, judged
-from experiments.kit.learning.live import ROBOTS, Compared, Distance, compared, contact_rows, draw_distances, learn_live, learn_offline
+from experiments.kit.learning.live import (
+    ROBOTS,
+    Compared,
+    Distance,
+    compared,
+    contact_rows,
+    draw_distances,
+    keep_observed,
+    learn_live,
+    learn_offline,
+)
 from experiments.kit.plots import saved
 from experiments.kit.rules import all_hold
 from experiments.kit.run_folder import read, write
@@ -76,6 +86,7 @@ def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
         for task, robot in product(_tasks(arguments), ROBOTS):
             learn_live(task, robot, arguments.seed + LIVE_SEED, number, folder / task / robot, report)
+            keep_observed(folder / task / robot, task)
     write(folder / LEAST_FILE, {"least": arguments.least})
     return results(folder)
 
@@ -112,12 +123,18 @@ def _compared(folder: Path) -> dict[str, Compared]:
 
 
 def _at_the_table(folder: Path) -> dict[str, Any]:
-    """Return how the actions of each part at the table ended, on each robot; nothing without --table."""
+    """Return the entry "at the table" of `results`: how the actions of each part ended at the table, on each robot.
+
+    Returns an empty dict if there are no runs at the table.
+    """
     return {"at the table": contact_rows(folder, "table")} if (folder / "table").exists() else {}
 
 
 def _rows(found: Compared) -> dict[str, dict[str, Any]]:
-    """Return the distances of each live robot, and of the offline seeds."""
+    """Return how far the learned transition model of each live robot, and of the offline runs, is from those of the (other) offline runs.
+
+    The keys are the robots and "offline seeds, smallest" (also median, largest); the rows are as in `results` under "distances".
+    """
     variation, agree = (np.array([getattr(one, name) for one in found.offline]) for name in ("variation", "agree"))
     number = int(np.median([one.compared for one in found.offline]))
     rows = {robot: _plain(one) for robot, one in found.live.items()}
@@ -155,7 +172,12 @@ def equal(tasks: Mapping[str, Compared]) -> Measured:
 
 
 def _as_near(value: float, offline: Sequence[float]) -> bool | None:
-    """Return whether a robot is as near as another offline seed; None where nothing was compared, or the seeds differ too much."""
+    """Return whether a live robot is as near to the offline runs as one more offline seed would be.
+
+    `value`: distance of the robot from the offline runs.  `offline`: distance of each offline run from the others.  The robot is not as
+    near if its distance is above EQUAL_DISTANCE and above `prediction_bound`.  Returns None if a distance is not finite (nothing was
+    compared), or if the distances of the offline runs differ too much for a positive verdict (MARGIN).
+    """
     most = prediction_bound(offline)
     if not np.isfinite([value, most]).all():
         return None
@@ -184,6 +206,6 @@ def _transitions(arguments: argparse.Namespace) -> int:
 EXPERIMENT = Experiment(
     claim="the transition model learned on the offline plant, with identified motors, is that of PyBullet's robot",
     source="aim of this reproduction; paper 4.1",
-    method=Steps(add_arguments, run, figure, results, (*CELL_FILES, LEAST_FILE, f"*/*/{STORE}")),
+    method=Steps(add_arguments, run, figure, results, (*CELL_FILES, LEAST_FILE, f"*/*/{Path(STORE).stem}.npz")),
     claims=(equal,),
 )

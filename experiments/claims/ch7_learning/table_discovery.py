@@ -202,7 +202,11 @@ _UNTESTED = "the settle speed and the cable force"
 
 
 def _against(number: Number, digits: int = 2, least: float = -np.inf) -> Rule:
-    """Return the rule that `number`, computed for each run, is larger for the curious agents at the table than for all controls."""
+    """Return a rule: a number is larger for the curious agents at the table than for every other group of runs, and above `least`.
+
+    The other groups are the curious agents at the ghost (a table without forces), and the other explorers at the table and at the ghost.
+    `number`: function that computes it from a run.  `digits`: decimals in the text.
+    """
 
     def of_runs(runs: Runs) -> Measured:
         values = of_each(runs, number)
@@ -450,7 +454,10 @@ def _outcomes(axes: Any, runs: Runs) -> None:
 
 
 def _detector(axes: Any, runs: Runs) -> None:
-    """Draw precision over recall of tries compared with the ghost's as a detector; dotted lines are chance."""
+    """Draw how well the actions that depend on other parts are found by their tries at the table over those at the ghost.
+
+    One curve shows the precision over the recall, for a learner and an explorer; a dotted line is the precision of a random choice.
+    """
     for learner, style in zip(LEARNERS, ("-", "--"), strict=True):
         for explorer in EXPLORERS:
             group = judged_of(runs, explorer, learner, "beside_ghost")

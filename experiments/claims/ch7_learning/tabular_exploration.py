@@ -130,7 +130,10 @@ def best_reward(plant: RewardedPlant) -> float:
 
 
 def _pursuing(plant: RewardedPlant, name: str, number: float) -> Explorer:
-    """Return an explorer that maximises rewards."""
+    """Return the explorer `name` for the task "return", in which an agent maximises the rewards of the world.
+
+    `number`: the parameter of this explorer, which the docstring of the module explains.
+    """
     kinds: dict[str, Callable[[], Explorer]] = {
         "curious": lambda: Curious(plant, number),
         "count bonus": lambda: CountBonus(plant, number),
@@ -142,7 +145,11 @@ def _pursuing(plant: RewardedPlant, name: str, number: float) -> Explorer:
 
 
 def _covering(plant: RewardedPlant, name: str, seed: int) -> dict[str, Any]:
-    """Explore without rewards; returns when everything was tried, and how accurate the beliefs are."""
+    """Explore a world without rewards, and return the values that `trial` describes for the task "coverage".
+
+    They are the numbers of transitions until every reachable action was tried, and the error of the beliefs.  `name`: explorer, one of
+    COVERAGE.
+    """
     plant.truth = np.zeros_like(plant.truth)
     plant.largest = 1.0  # unknown to the explorers: there could be rewards
     explorers: dict[str, str | Explorer] = {
@@ -244,7 +251,7 @@ def findings(found: Cells) -> dict[str, Any]:
 
 
 def _summary(runs: Runs, name: str) -> list[float]:
-    """Return the interquartile mean and its interval, rounded."""
+    """Return [mean, low, high], rounded: the interquartile mean of the number `name` over the runs, and its confidence interval."""
     values = [run[name] for run in runs]
     return [float(f"{number:.4g}") for number in (interquartile_mean(values), *interval(values))]
 

@@ -85,7 +85,10 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def _numbered(contacts: list[SelfContact | None]) -> tuple[list[str], NDArray[np.int16]]:
-    """Return the pairs of links that touched, and the index of the pair that did in each action, (T,)."""
+    """Return the names of all pairs of links that touched, and for each action the index of its pair in this list, (T,).
+
+    The index is -1 for an action without self-contact.  `contacts`: deepest self-contact of each action, or None.
+    """
     pairs = sorted({contact.pair for contact in contacts if contact})
     touching = [-1 if contact is None else pairs.index(contact.pair) for contact in contacts]
     return [" and ".join(pair) for pair in pairs], np.array(touching, dtype=np.int16)

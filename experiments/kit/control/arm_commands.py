@@ -166,7 +166,10 @@ def _begin_phase(controller: Controller, part: str, command: Command, phase: int
 
 
 def _legal(robot: Robot, q: Array) -> Array:
-    """Return the posture nearest to q on the line from home in which all constraints are farther than MARGIN."""
+    """Return the posture nearest to q on the line from home in which all cable constraints are farther than MARGIN (15 degrees) away.
+
+    Only 21 points of the line are tried; if none is far enough, home is returned.
+    """
     for share in np.linspace(1.0, 0.0, 21):
         found: Array = robot.home + share * (q - robot.home)
         if clause_violations(robot, found[None]).max() < -MARGIN:

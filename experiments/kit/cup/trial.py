@@ -120,7 +120,10 @@ class Trial:
         return approach(self.plant, self.picker, self.seen, planner)
 
     def _judge(self, azimuth: float) -> None:
-        """Compare the pose of the palm with the place beside the cup, where the cup truly is."""
+        """Compare the pose of the palm with its wanted pose beside the true place of the cup, and store the measures in `self.result`.
+
+        `azimuth`: direction that the palm faces by the plan of the approach, rad.
+        """
         things, result = self.plant.things, self.result
         cup = things[CUP].position[:2]
         wanted = palm_beside(cup, RADIUS, azimuth, self.grasp.grip.before, TOP, self.grasp.grip)

@@ -129,6 +129,7 @@ def arm_clauses() -> list[Clause]:
 def min_margin() -> float:
     """Return the smallest value of a.q + b [rad] at which a pose counts as clear of a cable constraint.
 
+    The factors a and b are those of `Clause`.
     It is half the width of the zone in which the published control law pushes the arm away from a constraint.  At this value the force
     moves a resting arm by about three degrees.  In the lattice with three levels per joint, this is a quarter of the distance from a state
     to the edge of its cell, the region of poses that are nearest to this state.

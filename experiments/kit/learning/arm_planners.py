@@ -346,7 +346,11 @@ class Repaired:
         return roadmap.path({v: roadmap.cost(q, v) for v in starts}, self._goal, self._out)
 
     def _edge(self, q: Array, vertex: int) -> Edge:
-        """Return the motion from q to a vertex; off the roadmap its start is the nearest vertex v, numbered -1 - v."""
+        """Return the motion from q (4,) rad to a vertex, as a pair of numbers.
+
+        It is the edge from the present vertex.  If the robot is at no vertex, the first number is -1 - v, where v is the vertex nearest to
+        q: such a motion must not be confused with the edge from v.
+        """
         return edge(self._at, vertex) if self._at is not None else (-1 - self._roadmap.nearest(q, 1)[0], vertex)
 
 

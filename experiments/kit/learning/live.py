@@ -8,6 +8,7 @@ averaged over the state-actions.
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import astuple, dataclass
 from pathlib import Path
@@ -26,6 +27,7 @@ from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
 from mobee.plant import Plant
 from mobee.robot.robot import Robot
+from mobee.robot.writing import write_whole
 from mobee.store import STORE, TransitionStore
 
 ROBOT, GAINS, RATE = "icub", "published_2014", 50  # RATE in Hz
@@ -35,6 +37,7 @@ ROBOTS = {  # settings of robot_sim; the identified motor model was fitted to th
     "mujoco": {"backend": "mujoco", "motors": "published"},
     "kinematic": {"backend": "kinematic", "motors": "identified"},
 }
+OBSERVED = str(Path(STORE).with_suffix(".npz"))
 PIECE = 200  # transitions of each part in one launch
 _ACTION_TIME = 7.0  # s of robot time for an action, a little above the torso's mean at the table
 _MAX_IDLE = 3  # launches in a row without a new transition
@@ -156,8 +159,10 @@ def learn_live(task: str, robot: str, seed: int, transitions: int, folder: Path,
             raise LaunchFailed(f"{folder}: {_MAX_IDLE} launches in a row made no transition; see their logs in {folder / 'launches'}")
 
 
-def observed(folder: Path, task: str, number: int) -> dict[str, Any]:
-    """Return the first `number` transitions of each part of a task that `learn_live` stored in `folder`; `task`: name of the task.
+def observed(folder: Path, task: str, number: int | None = None) -> dict[str, Any]:
+    """Return the first `number` transitions of each part of a task that `learn_live` stored in `folder`, or all if `number` is None.
+
+    `task`: name of the task.
 
     Returns for each part "seen_<part>": transitions (T, 3): state, action, state reached; and "touched_<part>": (T,), whether a transition
     ended in contact with an object of the world.
@@ -166,9 +171,24 @@ def observed(folder: Path, task: str, number: int) -> dict[str, Any]:
     for part in TASKS[task].parts:
         with TransitionStore(folder / STORE, part, read_only=True) as store:
             made = store.load()[:number]
-        values[f"seen_{part}"] = np.array([(one.s, one.a, one.s_next) for one in made], dtype=np.int32)
+        values[f"seen_{part}"] = np.array([(one.s, one.a, one.s_next) for one in made], dtype=np.int32).reshape(-1, 3)
         values[f"touched_{part}"] = np.array([bool(one.touched) for one in made])
     return values
+
+
+def keep_observed(folder: Path, task: str) -> None:
+    """Write the transitions of a task that `learn_live` stored in `folder` to the file OBSERVED in it, small enough for a record."""
+    content = io.BytesIO()
+    np.savez_compressed(content, **observed(folder, task))
+    write_whole(folder / OBSERVED, content.getvalue())
+
+
+def _kept(folder: Path, task: str) -> dict[str, Any] | None:
+    """Return the transitions of a task in a folder of `learn_live`, from its file OBSERVED or else its store; None if it has neither."""
+    if (folder / OBSERVED).exists():
+        with np.load(folder / OBSERVED) as arrays:
+            return dict(arrays)
+    return observed(folder, task) if (folder / STORE).exists() else None
 
 
 def _made(folder: Path, task: str) -> dict[str, int]:
@@ -181,7 +201,12 @@ def _made(folder: Path, task: str) -> dict[str, int]:
 
 
 def _scenario(task: str, robot: str, seed: int, goals: Mapping[str, int], slowest: int, folder: Path) -> str:
-    """Return the scenario of one launch; the seed of robot and encoders differs between launches, that of the agents does not."""
+    """Return the scenario of one launch as text in TOML.
+
+    The seed of robot and encoders differs between launches, that of the agents does not.
+    `goals`: number of transitions of each part, old ones included, at which its agent ends.  `slowest`: smallest number of transitions that
+    a part has made; the seed of the robot is computed from it.  `folder`: where the agents store their transitions.
+    """
     wanted = TASKS[task]
     text = _SCENARIO.format(
         robot=robot, model=ROBOT, world=wanted.world, gains=GAINS, rate=RATE, seed=1000 * seed + slowest, **ROBOTS[robot]
@@ -284,13 +309,11 @@ def compared(folder: Path, task: str, least: int) -> Compared:
     offline = tuple(distance(seed, others, least) for seed, others in zip(seeds, without, strict=True))
     counts: dict[str, Counts] = {"offline": together}
     for name in ROBOTS:
-        path = folder / task / name / STORE
-        if path.exists():
-            with TransitionStore(path, "") as store:
-                rows = {part: np.array([(t.s, t.a, t.s_next) for t in store.load(part)]).reshape(-1, 3) for part in parts}
-            counts[name] = {part: counts_of(rows[part][: results[0].cell.settings["transitions"]], spaces[part]) for part in parts}
-    live = {name: mean([distance(counts[name], others, least) for others in without]) for name in counts if name in ROBOTS}
-    return Compared(live, offline, counts)
+        if (live := _kept(folder / task / name, task)) is not None:
+            number = results[0].cell.settings["transitions"]
+            counts[name] = {part: counts_of(live[f"seen_{part}"][:number], spaces[part]) for part in parts}
+    apart = {name: mean([distance(counts[name], others, least) for others in without]) for name in counts if name in ROBOTS}
+    return Compared(apart, offline, counts)
 
 
 @dataclass(frozen=True, slots=True)
@@ -334,11 +357,9 @@ def contacts(folder: Path, task: str) -> dict[str, dict[str, Contacts]]:
         for values in results:
             every += Contacts.of(own, values[f"seen_{part}"], values[f"touched_{part}"])
         found.setdefault("offline", {})[part] = every
-        for name in (name for name in ROBOTS if (folder / task / name / STORE).exists()):
-            with TransitionStore(folder / task / name / STORE, part, read_only=True) as store:
-                made = store.load()
-            seen, touched = np.array([(one.s, one.a, one.s_next) for one in made]), np.array([bool(one.touched) for one in made])
-            found.setdefault(name, {})[part] = Contacts.of(own, seen, touched)
+        for name in ROBOTS:
+            if (live := _kept(folder / task / name, task)) is not None:
+                found.setdefault(name, {})[part] = Contacts.of(own, live[f"seen_{part}"], live[f"touched_{part}"])
     return found
 
 

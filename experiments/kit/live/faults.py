@@ -217,7 +217,10 @@ class FaultInjector:
         return None if stat is None else stat.pid
 
     def _forge(self, kind: str) -> None:
-        """Take FORGED_PART in the controller's name and arm it, or release it by its public epoch."""
+        """Pretend to be the controller, and call robot_sim to take and arm FORGED_PART ("arm"), or to release it ("release").
+
+        The release needs the epoch, the number of the present ownership of the part, which every program can read on the bus.
+        """
         if kind == "release" and (epoch := self._epoch()) is not None:
             self._call(keys.drive(FORGED_PART, "release"), WithEpoch, Driven, epoch=epoch)
         elif kind == "arm" and (taken := self._call(keys.drive(FORGED_PART, "take"), Take, Taken, instance="i1_forged")) is not None:
@@ -294,7 +297,10 @@ def _without_files(pid: int) -> Iterator[None]:
 
 @contextmanager
 def _limited(pid: int, limit: int, soft: int) -> Iterator[None]:
-    """Lower a limit of a process, and restore it at the end; if the process has ended before, there is nothing to lower."""
+    """Set the soft limit of a resource of a process to `soft`, and restore it at the end of the context.
+
+    `limit`: the resource, such as resource.RLIMIT_NOFILE.  If the process has ended before, nothing is done.
+    """
     try:
         before = resource.prlimit(pid, limit)
         resource.prlimit(pid, limit, (soft, before[1]))

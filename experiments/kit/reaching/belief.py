@@ -116,7 +116,11 @@ class PeerBelief:
         return bool(self._allowed(q, poses).all()) and not len(self._touching(poses, care))
 
     def _allowed(self, q: Array, poses: Array) -> NDArray[np.bool_]:
-        """Return which poses are within the limits, violate no clause and are away from blocked poses."""
+        """Return which of P poses, (P,), are within the limits, violate no clause and are away from the poses in `blocked`.
+
+        A clause is a condition on several motor positions.  `q`: (P, d) rad, encoder readings of the planned motors.  `poses`: (P, n) rad,
+        the same poses as `whole` returns them.  Contacts are not checked.
+        """
         good: NDArray[np.bool_] = np.all((q >= self.range[:, 0] - 1e-9) & (q <= self.range[:, 1] + 1e-9), axis=1)
         for clause in self._clauses:
             np.logical_and(good, (poses @ clause.a.T + clause.b).max(axis=1) >= 0.0, out=good)
@@ -126,7 +130,11 @@ class PeerBelief:
         return good
 
     def _touching(self, poses: Array, care: Care) -> Ints:
-        """Return the indices of the poses (P, n) that touch something."""
+        """Return the indices of the poses (P, n) rad that have a contact which `care` forbids; an index is repeated for each such contact.
+
+        "solids": all contacts of solids.  "grasping": these, except contacts of the hand with the target.  "fields": contacts of solids and
+        of fields, except those of the hand's fields with the target.
+        """
         table = self._evaluate(poses, reaching=care == "grasping").table
         counted = table.kind == 0
         if care == "fields":  # the hand's may be in the target
@@ -146,7 +154,11 @@ class PeerBelief:
         return size
 
     def _hand(self) -> NDArray[np.bool_]:
-        """Return the links (L,) whose fields the target does not push while the marker reaches."""
+        """Return a mask (L,) of the robot's links: True for the links of the hand, on whose fields the target exerts no force in a reach.
+
+        Fields are volumes around links that cause repulsive forces; some links nearer to the base than the marker also count
+        (`Hand.fields`).
+        """
         first = self.model.hand(self.marker).fields
         exempt = np.zeros(len(self.model.robot.links), dtype=np.bool_)
         for link in range(first, len(exempt)):  # a parent has a smaller number than its children
@@ -154,7 +166,10 @@ class PeerBelief:
         return exempt
 
     def _evaluate(self, poses: Array, reaching: bool) -> Pose:
-        """Evaluate poses (P, n) rad; `reaching`: the target exerts no force on the hand."""
+        """Return the evaluated poses (P, n) rad: their kinematics and their contacts.
+
+        `reaching`: True: the target exerts no force on the hand, and its contacts with the hand are not listed; False: they are listed.
+        """
         return self.model.evaluate(poses, reaching=self.marker if reaching else None)
 
 
@@ -259,7 +274,11 @@ SHORTCUTS = 60  # attempts
 
 
 class _Careful(NamedTuple):
-    """A belief with a degree of care, as a `mobee.roadmap.ompl.ValidityChecker`."""
+    """A `PeerBelief` with a fixed `care` (set of forbidden contacts), in the interface `mobee.roadmap.ompl.ValidityChecker`.
+
+    `low`, `span`: lower limits and ranges of the d motors, (d,) rad.  `box`: (d, 2) rad, limits between which OMPL draws samples: there the
+    joint limits exert no force.
+    """
 
     low: Array
     span: Array
@@ -283,11 +302,11 @@ def rrt_connect(
 
 
 def shortened(belief: PeerBelief, path: Array, rng: np.random.Generator, care: Care = "solids") -> Array:
-    """Return the path (k, d) rad with straight sound motions in place of detours.
+    """Return the path (k, d) rad with straight motions in place of detours, where all poses on them are sound (allowed).
 
-    Straight motions are tried from each waypoint as far as possible, then between random points on the path, then from each waypoint again.
-    `rng`: for the random points.  `care`: the contacts that are forbidden: "solids", "grasping" or "fields", explained at
-    `PeerBelief.sound`.
+    `PeerBelief` defines "sound".  Straight motions are tried from each waypoint as far as possible, then between random points on the path,
+    then from each waypoint again.  `rng`: for the random points.  `care`: the contacts that are forbidden: "solids", "grasping" or
+    "fields", explained at `PeerBelief.sound`.
     """
     found = _straightened(belief, list(path), care)
     for _ in range(SHORTCUTS if len(found) > 2 else 0):
@@ -302,7 +321,11 @@ def shortened(belief: PeerBelief, path: Array, rng: np.random.Generator, care: C
 
 
 def _straightened(belief: PeerBelief, path: list[Array], care: Care) -> list[Array]:
-    """Return only the waypoints that are needed, chosen greedily from the start."""
+    """Return a subset of the waypoints, with the first and the last, such that straight motions between them are allowed.
+
+    The waypoints are chosen greedily: after each one follows the farthest waypoint that a straight sound motion reaches, or the next one of
+    the path.  `path`: list of poses (d,) rad.  `care`: the forbidden contacts; it and "sound" are explained at `PeerBelief.sound`.
+    """
     corners, at = [path[0]], 0
     while at < len(path) - 1:
         at = next(k for k in range(len(path) - 1, at, -1) if k == at + 1 or belief.sound_motion(path[at], path[k], care))

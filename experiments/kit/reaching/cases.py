@@ -131,7 +131,11 @@ def _behind(belief: PeerBelief, target: ReachTarget, hand: Array) -> bool:
 
 
 def _touches(belief: PeerBelief, target: ReachTarget, q: Array, offset: Array) -> bool:
-    """Return whether a solid of the arm is within TOUCH of the target and the palm, `offset` (3,) m from it, faces away from it."""
+    """Return whether a solid of the arm is at the target, and the palm faces away from the target.
+
+    "At the target" is: within 3 cm (TOUCH) of its surface.  `q`: (4,) rad, pose of the arm, without a contact of solids.  `offset`: (3,) m,
+    root frame, vector from the palm to the target's centre.
+    """
     belief.present(ReachTarget(target.position, target.radius + TOUCH))
     near = not belief.sound(q[None])[0]
     belief.present(target)
@@ -139,7 +143,10 @@ def _touches(belief: PeerBelief, target: ReachTarget, q: Array, offset: Array) -
 
 
 def _goal_of(target: ReachTarget, belief: PeerBelief, rng: np.random.Generator) -> Array | None:
-    """Draw a place at a distance MOVED from the target; None if the palm cannot touch it."""
+    """Draw a place, (3,) m, root frame, 5 to 12 cm (MOVED) from the target's centre, in any direction.
+
+    Returns None if inverse kinematics does not bring the palm to the surface of the target, moved to this place.
+    """
     offset = rng.normal(size=3)
     place = target.position + rng.uniform(*MOVED) * offset / np.linalg.norm(offset)
     low, high = belief.limits.T
@@ -209,7 +216,10 @@ def attempt(method: str, agent: ReachAgent, case: Case, seed: int, motors: Motor
 
 
 def _missing(plant: OfflinePlant, case: Case, start: float) -> float:
-    """Return the distance of the palm from its aim now, m."""
+    """Return the present distance [m] of the palm from the target's centre, or from its surface if the target's `aim` is "surface".
+
+    The target is where the case puts it now.  `start`: time of the plant [s] at which the target was first presented.
+    """
     whole = plant.q
     return case.seen_at(plant.time - start).missing(plant.model.evaluate(whole).position(MARKER))
 
@@ -226,6 +236,10 @@ def begun(case: Case, seed: int, motors: MotorParameters | None = None, law: str
 
 
 def _nearness(palms: Array, target: Array) -> Array:
-    """Return the reward of the palm's position in each state, (S,): the value of a state if no reach follows."""
+    """Return the expected reward in each state if no reach follows, (S,), computed from the palm's distance to the target.
+
+    The reward is that of thesis eq. 8.4, with the distance to the surface of a target of the default radius (5 cm) as the remaining error.
+    `palms`: (S, 3) m, root frame, position of the palm in each state.  `target`: (3,) m, root frame, centre of the target.
+    """
     distances = np.maximum(np.linalg.norm(palms - target, axis=1) - RADIUS, 0.0)
     return np.array([reward_of(float(distance)) for distance in distances])

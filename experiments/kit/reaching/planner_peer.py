@@ -136,7 +136,11 @@ class PeerPlans:
         return np.concatenate([escape, path[1:]]) if len(path) > 1 or len(escape) else path, poses[chosen]
 
     def _path(self, start: Array, ends: Array) -> Array | None:
-        """Plan a path free of field contacts if start and end allow that, else one free of solid contacts."""
+        """Return the waypoints (k, d) rad of a path from `start` (d,) to one of the poses `ends` (G, d) rad, None if none was found.
+
+        If neither `start` nor at least one of `ends` has a contact of the repulsive fields, a path without such contacts to such an end is
+        tried first.  Otherwise, or if none is found, only contacts of solids are avoided.
+        """
         belief = self._belief
         clear = ends[belief.sound(ends, "fields")]
         cares: tuple[Care, ...] = ("fields", "solids") if len(clear) and belief.sound(start[None], "fields")[0] else ("solids",)
@@ -147,7 +151,11 @@ class PeerPlans:
         return None
 
     def _escape(self, here: Array) -> Array:
-        """Return the nearest sound pose among random poses around here, in growing distance."""
+        """Return the sound pose (d,) rad nearest to the pose `here` among random poses around it; `here` itself if none is found.
+
+        `PeerBelief` defines "sound".  The random poses are drawn around `here` with a standard deviation of 5, 10, 20 and 40 % of the
+        motors' ranges, in this order, until some of them are sound.  Distances are in units of the motors' ranges.
+        """
         belief = self._belief
         for width in (0.05, 0.1, 0.2, 0.4):
             drawn = np.clip(here + width * belief.span * self._rng.normal(size=(ESCAPES, len(here))), *belief.range.T)
@@ -280,7 +288,11 @@ class PlannerPeer:
         return self._actions, self._plans, self._plant.time, self._planning, self._belief.checked
 
     def _approach(self, sees: Callable[[], ReachTarget]) -> tuple[float, Ended]:
-        """Plan and go until the marker is believed at the target or no action is left; returns the true remaining error, m, and the end."""
+        """Plan and move until the marker is believed to be at the target, no action is left or no plan is found.
+
+        Returns the true remaining error [m] and the reason of the end, as in the fields `missing` and `ended` of `PeerTry`.  `sees`:
+        function that returns the target as it is seen now.
+        """
         missing, stop, ended = np.inf, self._actions + self._limit, ENDS[1]
         while self._actions < stop:
             seen = sees()

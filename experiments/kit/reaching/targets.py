@@ -103,14 +103,21 @@ def nearest_pose(
 
 
 def _error(q: Array, model: Model, marker: str, place: Array, columns: Array) -> tuple[float, Array]:
-    """Return half the squared distance, and its gradient."""
+    """Return half the squared distance, m^2, of the marker from a place (3,) m, root frame, and its gradient by q, (d,) m^2/rad.
+
+    `q`: (d,) rad, angles of the motors with the indices `columns`; all other motors are at home.
+    """
     whole = _whole(q, model.robot.home, columns)
     error = model.evaluate(whole).position(marker) - place
     return 0.5 * float(error @ error), model.jacobian(whole, marker)[:3, columns].T @ error
 
 
 def _clearance(q: Array, home: Array, columns: Array, clauses: Sequence[Clause]) -> Array:
-    """Return the largest row of each clause: a clause holds where it is above 0."""
+    """Return one number for each clause, (C,): the largest component of a q + b; the clause holds if it is above 0.
+
+    A clause is a condition on several motor positions, which the shoulder's cables impose; `a` and `b` are its fields.  `q`: (d,) rad,
+    angles of the motors with the indices `columns`; all others are at home.
+    """
     whole = _whole(q, home, columns)
     return np.array([(clause.a @ whole + clause.b).max() for clause in clauses])
 

@@ -86,7 +86,10 @@ def swept(starts: Array, ends: Array, point: Array, clearance: float) -> NDArray
 
 
 def _links(poses: Array) -> tuple[Array, Array]:
-    """Return the upper arm and the forearm as vectors, (..., 3) m each: x forward, y outward, z up."""
+    """Return two vectors, (..., 3) m each: from the shoulder to the elbow, and from the elbow to the palm.
+
+    `poses`: (..., 4) rad, shoulder pitch, roll, yaw, elbow.  x points forward, y outward, z up.
+    """
     pitch, roll, yaw, elbow = np.moveaxis(np.asarray(poses), -1, 0)
     none, bent = np.zeros_like(pitch), np.sin(elbow)
     upper = np.stack([none, none, np.full_like(pitch, -UPPER)], axis=-1)
@@ -101,7 +104,10 @@ def _turned(vector: Array, pitch: Array, roll: Array) -> Array:
 
 
 def _distance(start: Array, along: Array, point: Array) -> Array:
-    """Return the distances from a point to line segments, (...)."""
+    """Return the distances (...) m from a point (3,) m to line segments.
+
+    Each segment goes from `start` (..., 3) to `start` + `along` (..., 3), m.
+    """
     share = np.clip(((point - start) * along).sum(axis=-1) / (along**2).sum(axis=-1), 0.0, 1.0)
     gap: Array = np.linalg.norm(start + share[..., None] * along - point, axis=-1)
     return gap

@@ -110,7 +110,11 @@ def measure(place: Array, law: str = "published", tries: int = TRIES, seed: int 
 
 
 class _Measuring:
-    """A measurement: the remaining tries, and the results so far."""
+    """Measures every reach and every transition on the plant, with one target in the world; `run` returns the results.
+
+    `left`: (S, A + 1), number of tries that are left for each transition, and in the last column for the reach from each state.  `missing`,
+    `made`, `failed`: the results so far, as in `Tried`.
+    """
 
     def __init__(self, space: Space, plant: OfflinePlant, target: ReachTarget, tries: int, seed: int) -> None:
         self.space, self.plant, self.target = space, plant, target
@@ -133,7 +137,10 @@ class _Measuring:
         return Tried(self.missing, self.made, self.failed)
 
     def _enter(self) -> int:
-        """Go without the target to a state with remaining tries; give up a state that cannot be entered."""
+        """Remove the target, act towards a random state with remaining tries, and return the state in which the arm ends.
+
+        If three attempts (MAX_ENTRIES) end in states without remaining tries, the remaining tries of the goal state are given up.
+        """
         self.plant.present(None)
         goal = int(self.rng.choice(np.flatnonzero(self.left.any(axis=1))))
         for _ in range(MAX_ENTRIES):

@@ -47,9 +47,9 @@ class RunLength:
 
     A change is reported when it is more probable than no change, and when the share has increased with a probability of at least 0.95
     (CERTAIN). Between two changes, a constant share of the outcomes contradicts what was learned and has the probability `unknown`; the
-    others have the probability `learned`. The share and the probability of a change are unknown, not settings: the detector weighs all
-    values in `SHARES` (0.01 to 0.95) and `HAZARDS` (0.01 to 0.00001) by their probability. A decrease of the share is not reported, because
-    it occurs without a change of the world: the predictions of the learner become better.
+    others have the probability `learned` (the two arguments of `add`). The share and the probability of a change are unknown, not settings:
+    the detector weighs all values in `SHARES` (0.01 to 0.95) and `HAZARDS` (0.01 to 0.00001) by their probability. A decrease of the share
+    is not reported, because it occurs without a change of the world: the predictions of the learner become better.
     """
 
     def __init__(self) -> None:

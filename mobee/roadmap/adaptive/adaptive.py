@@ -89,7 +89,7 @@ class AdaptiveRoadmap:
 
     @property
     def lengths(self) -> Array:
-        """Lengths of the edges in joint space, shape (S, A), rad; 0 where there is no edge."""
+        """Lengths [rad] of the edges in joint space, (S, A): a row for each vertex, a column for each of its edges; 0: no edge."""
         space = self.space
         steps = space.samples[space.goals] - space.samples[:, None]
         return np.where(space.goals == NO_ACTION, 0.0, np.sqrt((steps**2).sum(axis=-1)))
@@ -126,7 +126,7 @@ class AdaptiveRoadmap:
         return self._search(goals)[0]
 
     def reward(self, goals: ArrayLike) -> Array:
-        """Return the reward (S, A) for which value iteration finds the paths of `plan` to the vertices `goals`.
+        """Return the reward (S vertices, A edges of each) for which value iteration finds the paths of `plan` to the vertices `goals`.
 
         The reward is minus the length of the edge [rad]. It is -inf for edges that are removed, that do not exist, that begin in a goal, or
         that begin or end at a vertex without a path to a goal.
@@ -323,7 +323,7 @@ class EdgeBeliefs:
 
     @property
     def probabilities(self) -> Array:
-        """Probabilities of the two `outcomes` of each edge, shape (S, A, 2); both are 0 where there is no edge."""
+        """Probabilities of the two ends of each edge, (S, A, 2): its goal, and the vertex where it began; 0 where there is no edge."""
         p = self.success
         return np.stack([p, np.where(self.goals == NO_ACTION, 0.0, 1.0 - p)], axis=-1)
 

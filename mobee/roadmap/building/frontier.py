@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The explored part of a task space: vertices, expansion weights, covered region (thesis Algorithm 4).
+"""The explored part of a task space: vertices, their expansion weights, and the region covered by simplices (thesis Algorithm 4).
 
-All points are task coordinates divided by the spacing of the roadmap, so that neighbours are about 1 apart.
+Searches for new vertices start first at vertices with large expansion weights. All points are task coordinates divided by the spacing of
+the roadmap, so that neighbours are about 1 apart.
 """
 
 from __future__ import annotations
@@ -132,11 +133,12 @@ MAX_NEIGHBOURS = 1.5  # spacings from a new vertex to the furthest of the n near
 
 
 class Frontier:
-    """Vertices V, edges E, region R and expansion weights of thesis Algorithm 4, in task coordinates divided by the spacing.
+    """Vertices V, edges E, covered region R and expansion weights of thesis Algorithm 4, in task coordinates divided by the spacing.
 
-    A direction at a vertex is free if the point one spacing away in this direction is inside the box, is at least MIN_DISTANCE (0.8
-    spacings) from all vertices, and is not covered by a simplex. The free directions of all vertices are updated with each new vertex.
-    `low`, `high`: (m,) corners of the task's box, in spacings. m is the dimension of the task space.
+    R consists of simplices, each of a new vertex and the m vertices nearest to it. A direction at a vertex is free if the point one spacing
+    away in this direction is inside the box, is at least MIN_DISTANCE (0.8 spacings) from all vertices, and is not in R. The free
+    directions of all vertices are updated with each new vertex. `low`, `high`: (m,) corners of the task's box, in spacings. m is the
+    dimension of the task space.
     """
 
     def __init__(self, low: Array, high: Array) -> None:

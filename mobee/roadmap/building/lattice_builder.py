@@ -159,7 +159,10 @@ class PointTable:
         self.intermediate: set[Point] = set()
 
     def vertices(self) -> tuple[Ints, Array, Array]:
-        """Return the points (V, m) of the vertices, their poses (V, n) rad and task coordinates (V, m)."""
+        """Return the points of the vertices, their poses (V, n) rad and task coordinates (V, m).
+
+        The points are (V, m) whole numbers, lattice or intermediate points of the `Lattice`.
+        """
         q = np.array(self.q, dtype=np.float64).reshape(-1, self._motors)
         y = np.array(self.y, dtype=np.float64).reshape(-1, self._coordinates)
         return self._points(self.vertex), q, y

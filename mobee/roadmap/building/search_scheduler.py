@@ -54,8 +54,8 @@ class SearchSettings:
             range.
         population: samples per generation; None: 4 + 3 ln(d), rounded down, for d motors that may move.
         patience: factor on the time limit: a search fails after patience * G generations, but not before 100 / m (m: dimension of the task
-            space).  G: number of generations within which 3/4 of the recent successful searches found their vertex.  The limit is 30 d
-            generations until 8 searches have succeeded, and 4 times as long where another search has failed.
+            space). G: number of generations within which 3/4 of the recent successful searches found their vertex. Until 8 searches have
+            succeeded, the limit is 30 d generations. It is 4 times as long for an aim within half a spacing of the aim of a failed search.
         tries: largest number of failed searches around a point.  After so many failed searches with aims within half a spacing of a point,
             no further search aims at this point.
         searches: number of simultaneous searches.

@@ -35,7 +35,8 @@ class TaskIK:
     def random_starts(self, count: int, rng: np.random.Generator) -> Array:
         """Draw start poses (count, n) rad for least squares.
 
-        Motors that may move and affect the task or the terms get random positions. All others are at their position in `problem.start`.
+        Motors that may move and affect the task or the terms of the problem's cost get random positions. All others are at their position
+        in `problem.start`.
         """
         low, high = self._problem.limits.T
         drawn = rng.uniform(low, high, (count, len(low)))
@@ -45,7 +46,7 @@ class TaskIK:
         """Draw start poses (N, n) rad around postures q (N, n) rad.
 
         `std`: (N,) standard deviation for each posture, as a fraction of each motor's range. Only the motors that affect the task or the
-        terms are varied.
+        terms of the problem's cost are varied, within their limits; motors that may not move are at `problem.start`.
         """
         low, high = self._problem.limits.T
         here = q[:, self._problem.free]

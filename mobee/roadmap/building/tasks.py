@@ -94,9 +94,10 @@ class Task:
 
 
 def place(marker: str, axes: str = AXES, box: Sequence[Range] = ()) -> Task:
-    """Return a task space: a marker's position along the `axes` ("xyz" or some of them) of the root frame (table 3.2, second row).
+    """Return a task space: a marker's position along the `axes` of the root frame (thesis table 3.2, second row).
 
-    `box`: (low, high) in m for each axis.
+    `axes`: "xyz" or some of these letters. `box`: (low, high) in m for each axis; required. Raises InvalidValue if `axes` is not valid or
+    the number of ranges in `box` is not that of the axes.
     """
     if not axes or len(set(axes)) != len(axes) or not set(axes) <= set(AXES):
         raise InvalidValue(f"axes {axes!r}: valid are 'x', 'y', 'z', each at most once, as 'xy'.")
@@ -112,7 +113,8 @@ def place(marker: str, axes: str = AXES, box: Sequence[Range] = ()) -> Task:
 def along(marker: str, direction: ArrayLike, low: float, high: float) -> Task:
     """Return a task space of one coordinate: the scalar product of `direction` (3,), root frame, and the position of a marker [m].
 
-    The direction may have any length; (1, 1, 1) gives table 3.2, first row. `low`, `high`: range of the product.
+    The direction may have any length; (1, 1, 1) gives the task space of thesis table 3.2, first row. `low`, `high`: range of the product in
+    m. Raises InvalidValue if the direction is 0.
     """
     components = vector("direction", direction)
     if not components.any():
@@ -121,7 +123,7 @@ def along(marker: str, direction: ArrayLike, low: float, high: float) -> Task:
 
 
 def motors(ranges: Mapping[str, Range]) -> Task:
-    """Return a task space: the positions of motors (table 3.2, third row).
+    """Return a task space: the positions of motors (thesis table 3.2, third row).
 
     `ranges`: (low, high) by name of the motor, in rad, or in m for a motor that slides.
     """

@@ -351,10 +351,11 @@ def relative_orientation(marker: str, to: str, goal: ArrayLike, tolerance: float
 def aligned(
     first: str, second: str, direction: ArrayLike, other: ArrayLike | None = None, tolerance: float = RADIANS, weight: float = PER_RAD
 ) -> Term:
-    """Return the term that makes a direction of one marker parallel to a direction of another; its residual is the angle [rad].
+    """Return the term that turns a direction of one marker to a direction of another; its residual is the angle between them [rad].
 
-    `direction`: (3,) in the frame of `first`. `other`: (3,) in the frame of `second`; None: the same three numbers as `direction`. A
-    residual of at most `tolerance` (5 degrees) meets the term; the cost is `weight` (2 per rad) times the residual.
+    `direction`: (3,) in the frame of `first`. `other`: (3,) in the frame of `second`; None: the same three numbers as `direction`. For
+    opposite directions the residual is pi. A residual of at most `tolerance` (5 degrees) meets the term; the cost is `weight` (2 per rad)
+    times the residual.
     """
     one = unit_vector("direction", direction)
     two = one if other is None else unit_vector("other", other)
@@ -374,9 +375,9 @@ def across(marker: str, axis: ArrayLike, direction: ArrayLike | None = None, tol
     """Return the term that keeps a marker's normal perpendicular to an axis (3,), root frame; its residual is the error angle [rad].
 
     `direction`: (3,) in the marker's frame, is used instead of the normal. The term has no derivative, so the inverse kinematics by least
-    squares does not minimise it, but only checks it at the end. It is met nevertheless if the same direction has a task coordinate
-    `mobee.tasks.angle` about the same axis: for this coordinate, least squares makes the direction perpendicular to the axis. A residual of
-    at most `tolerance` (5 degrees) meets the term; the cost is `weight` (2 per rad) times the residual.
+    squares does not minimise it, but only checks it at the end. Therefore use it together with the task coordinate `mobee.tasks.angle` of
+    the same direction about the same axis: for this coordinate, least squares also makes the direction perpendicular to the axis. A
+    residual of at most `tolerance` (5 degrees) meets the term; the cost is `weight` (2 per rad) times the residual.
     """
     along, own = unit_vector("axis", axis), None if direction is None else unit_vector("direction", direction)
 

@@ -57,9 +57,9 @@ _MIN_EFFECT = 1e-9
 def needed(problem: Problem, aims: Iterable[Aim]) -> Flags:
     """Return which motors must have random positions in the random start poses of a search, (d,) booleans for the motors that may move.
 
-    These are the motors that move a link of one of the `aims` (residuals for least squares), the motors of aims, and those that change the
-    residual of a term that has a tolerance but no derivative; this is tested in PROBES (3) random poses. The term "collision" is left out:
-    if the fingers, for example, began at random positions, they would only cause more contacts.
+    True for a motor that moves a link of one of the `aims` (residuals for least squares), and for a motor whose own position is an aim.
+    True also for a motor that changes the residual of a term that has a tolerance but no derivative; this is tested in PROBES (3) random
+    poses. The term "collision" is left out: if the fingers, for example, began at random positions, they would only cause more contacts.
     """
     moves = _movers(problem.model.robot, aims)[problem.free]
     others = [one for one in problem.terms if one.aims is None and one.tolerance is not None and one.name != "collision"]

@@ -173,8 +173,9 @@ class Descent:
     def run(self, q: Array, goals: Array | None = None) -> Array:
         """Search from the start poses q (B, n) rad; return only the K solutions whose residuals are all within the tolerances, (K, n) rad.
 
-        `goals`: (B, 26 k): row i is what `aim_reals` returns for the k additional aims of start i. They replace the k aims `besides` of the
-        class, and must have the same kinds, links and motors, in the same order. None: the aims `besides` are used for all starts.
+        `goals`: (B, 26 k), goals that differ between the starts. Row i describes k aims (residuals) for start i, as `aim_reals` returns
+        them. They replace the k aims that the constructor got as `besides`, and must have the same kinds, links and motors, in the same
+        order. None: the aims `besides` are used for all starts.
         """
         ends, met = self.met(q, goals)
         return ends[met]
@@ -182,8 +183,9 @@ class Descent:
     def met(self, q: Array, goals: Array | None = None) -> tuple[Array, Flags]:
         """Return the solutions (B, n) rad found from the starts q (B, n) rad, and whether each is within the tolerances of all aims, (B,).
 
-        `goals`: (B, 26 k): row i is what `aim_reals` returns for the k additional aims of start i. They replace the k aims `besides` of the
-        class, and must have the same kinds, links and motors, in the same order. None: the aims `besides` are used for all starts.
+        `goals`: (B, 26 k), goals that differ between the starts. Row i describes k aims (residuals) for start i, as `aim_reals` returns
+        them. They replace the k aims that the constructor got as `besides`, and must have the same kinds, links and motors, in the same
+        order. None: the aims `besides` are used for all starts.
         """
         ends, residuals = self.ends(q, goals)
         met: Flags = (residuals > self._enough).sum(axis=1) == 0
@@ -192,8 +194,9 @@ class Descent:
     def ends(self, q: Array, goals: Array | None = None) -> tuple[Array, Array]:
         """Return the solutions (B, n) rad found from the starts q (B, n) rad, and the residuals of all aims there, (B, aims), m or rad.
 
-        `goals`: (B, 26 k): row i is what `aim_reals` returns for the k additional aims of start i. They replace the k aims `besides` of the
-        class, and must have the same kinds, links and motors, in the same order. None: the aims `besides` are used for all starts.
+        `goals`: (B, 26 k), goals that differ between the starts. Row i describes k aims (residuals) for start i, as `aim_reals` returns
+        them. They replace the k aims that the constructor got as `besides`, and must have the same kinds, links and motors, in the same
+        order. None: the aims `besides` are used for all starts.
         The columns of the residuals are the aims of the problem's terms, then the additional aims. The number of evaluated poses is added
         to `problem.evaluations`.
         """

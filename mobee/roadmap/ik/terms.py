@@ -102,7 +102,7 @@ def direction_frame(direction: Array) -> Array:
 
 
 def directed(marker: Marker, direction: Array, goal: Array) -> Aim:
-    """Return the aim that turns a direction of a marker's link to the direction `goal` (3,), root frame.
+    """Return the aim (a residual for least squares) that turns a direction of a marker's link to the direction `goal` (3,), root frame.
 
     `direction`: (3,), fixed to the link, in the root frame at the zero pose.
     """
@@ -112,7 +112,7 @@ def directed(marker: Marker, direction: Array, goal: Array) -> Aim:
 def level(marker: Marker, direction: Array, value: float) -> Aim:
     """Return the aim that makes direction . x equal to `value`, where x is the position of the marker [m], root frame.
 
-    `direction` (3,) may have any length; `value` is in m times this length.
+    An aim is a residual for least squares. `direction` (3,) may have any length; `value` is in m times this length.
     """
     return Aim(COORDINATE, marker.link, marker.position, UPRIGHT, 0, NOWHERE, direction_frame(direction), value)
 
@@ -120,13 +120,13 @@ def level(marker: Marker, direction: Array, value: float) -> Aim:
 def below(marker: Marker, direction: Array, value: float) -> Aim:
     """Return the aim that makes direction . x at most `value`, where x is the position of the marker [m], root frame.
 
-    `direction` (3,) may have any length; `value` is in m times this length.
+    An aim is a residual for least squares. `direction` (3,) may have any length; `value` is in m times this length.
     """
     return Aim(AT_MOST, marker.link, marker.position, UPRIGHT, 0, NOWHERE, direction_frame(direction), value)
 
 
 def motor_at(motor: int, value: float) -> Aim:
-    """Return the aim that brings the motor with the index `motor` to the position `value` [rad]."""
+    """Return the aim (a residual for least squares) that is zero if the motor with the index `motor` is at `value` [rad]."""
     return Aim(MOTOR, 0, NOWHERE, UPRIGHT, 0, NOWHERE, UPRIGHT, value, motor)
 
 

@@ -254,9 +254,10 @@ class _Builder(LineHandler):
 
 
 def read_dae(path: Path) -> Array:
-    """Return the points (v, 3) m of all geometries in the scene of a COLLADA file, in the frame of the scene; raises RobotFileError.
+    """Return the points (v, 3) m of all geometries in the scene of a COLLADA file, in the frame of the scene.
 
-    If the scene places no geometry, all geometries of the file are taken.
+    If the scene places no geometry, all geometries of the file are taken. Raises RobotFileError if the file is missing, not valid or too
+    large.
     """
     builder = _Builder(path)
     parse_xml(path, builder)

@@ -54,9 +54,10 @@ def find_srdf(urdf: Path, robot: str) -> Path | None:
 
 
 def read_srdf(path: Path, tree: Tree) -> Srdf:
-    """Return the content of an SRDF file; warns of links, joints and groups that the robot does not have; raises RobotFileError.
+    """Return the content of an SRDF file; warns of links, joints and groups that the robot does not have.
 
-    `tree`: links and joints of the robot's URDF.
+    `tree`: links and joints of the robot's URDF. Raises RobotFileError if the file cannot be read, is not an SRDF file, has too many groups
+    or lacks a required attribute.
     """
     root = read_xml(path)
     if root.tag != "robot":
@@ -216,10 +217,10 @@ def _value(node: Node, joint: UrdfJoint) -> float:
 def choose_home(states: Mapping[str, State], asked: str | None, srdf: Path | None) -> Home:
     """Return the home pose of a robot.
 
-    `states`: the poses in the SRDF, by name. `asked`: name of the requested pose, or "zero". None: the pose "home"; if the SRDF does not
-    have it, the next of the names HOMES ("ready", ...) that it has. If it has none of these names, its only pose; if it has several poses
-    or none, "zero". The pose "zero" has no positions, unless the SRDF has a pose of this name. `srdf`: path of the SRDF, for the
-    error message. In names, upper and lower case do not matter. Raises UnknownName with the valid names.
+    `states`: the poses in the SRDF, by name. `asked`: name of the requested pose, or "zero". If it is None, the result is the first of
+    these that exists: a pose with a name of the list HOMES ("home", "ready", ..., in this order); the only pose of the SRDF, if it has just
+    one; "zero". The pose "zero" has no positions, unless the SRDF has a pose of this name. `srdf`: path of the SRDF, for the error message.
+    In names, upper and lower case do not matter. Raises UnknownName, with the valid names, if there is no pose `asked`.
     """
     lower = {name.lower(): name for name in states}
     if asked is not None:

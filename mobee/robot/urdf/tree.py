@@ -193,7 +193,7 @@ def child(parent: Node, tag: str) -> Node | None:
 
 
 def triple(node: Node, name: str) -> Array:
-    """Return the three numbers (3,) of an attribute; raises RobotFileError if they are not three, or one is above 1e6 (m or rad)."""
+    """Return the three numbers (3,) of an attribute; raises RobotFileError if they are not three, or not from -1e6 to 1e6 (m or rad)."""
     values = np.array(node.numbers(name, 3))
     if float(np.abs(values).max()) > FARTHEST:
         node.fail(name, f"{float(np.abs(values).max()):g} is too large", "URDF counts in metres and radians")
@@ -201,7 +201,7 @@ def triple(node: Node, name: str) -> Array:
 
 
 def bounded(node: Node, name: str, default: float | None = None) -> float:
-    """Return the number of an attribute, or `default` if it is absent; raises RobotFileError if it is above 1e6 (m or rad).
+    """Return the number of an attribute, or `default` if it is absent; raises RobotFileError if its absolute value is above 1e6 (m or rad).
 
     Without a default the attribute is required.
     """

@@ -129,7 +129,7 @@ def write_urdf(robot: Robot, path: str | Path) -> Path:
     `load_robot` reads the file as the same robot with these differences: it has no clauses (conditions on several motor positions) and no
     cameras; `Robot.least_lever`, which scales the forces of fields, is 0; the visuals are the solids; `Motor.zone_ends_at_home`, which ends
     a limit zone at home, is True for all motors; a convex shape with more than 64 corners is replaced by an enclosing hull with at most 64.
-    Raises InvalidValue for a joint that no motor or several drive.
+    Raises InvalidValue if a joint has no motor, or if several motors drive it.
     """
     path = Path(path)
     drives_of(robot)  # raises for a joint without a master

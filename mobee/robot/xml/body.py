@@ -40,8 +40,9 @@ class Draft:
     state why two links are not tested for contacts. `elements`: the root, and all <link> and <joint> elements. `hosts`: for each shape, the
     index of its element. `shape_names`: name of a shape -> the number that is appended if another shape gets this name. `base_shapes`:
     indices of shapes that are not tested against world objects. `hides`: camera -> its XML element, and the names of the links that it does
-    not show. `constraints`: part and XML element of each constraint list. `ignores`: <ignore> elements. `others`: included robots, with the
-    XML elements that include them. `where`: (kind, name) -> "file:line".
+    not show. `constraints`: part and XML element of each <constraintList>, a condition on motor positions. `ignores`: the <ignore>
+    elements, which name pairs that are not tested for contacts. `others`: included robots, with the XML elements that include them.
+    `where`: (kind, name) -> "file:line".
     """
 
     links: list[str] = field(default_factory=lambda: ["base"])
@@ -79,8 +80,8 @@ class Place:
     frame, the start of this <link>, to which its shapes and markers are relative. `link`: index of the robot's link. `carrier`: index of
     the link to which elements with turns="false" belong: directly inside a <joint> it is the link that carries the joint, elsewhere it is
     `link`. `part`, `motor`: names of the current part and motor, "": none. `subtree`: index of the outermost element around this
-    position that has the attribute noSelfCollision (see `Draft`), -1: none. `base`: whether shapes here belong to `Draft.base_shapes`.
-    `element`: index of the current element.
+    position that has the attribute noSelfCollision (see `Draft`), -1: none. `base`: whether shapes here belong to the robot's base, which
+    is never tested against world objects (`Draft.base_shapes`). `element`: index of the current element in `Draft.elements`.
     """
 
     point: Array

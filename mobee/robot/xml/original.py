@@ -62,7 +62,8 @@ class Evidence:
 def find_evidence(root: Node) -> Evidence | None:
     """Return the clearest sign that a robot file was written for the programs of 2010 to 2014; None if there is none.
 
-    A sign that shows the years of the file's format is preferred. The result is `certain` if any sign in the file is certain.
+    A sign that shows the years of the file's format is preferred. The result's attribute `certain` is True if the file has any sign that
+    cannot occur in a file of the later version 0.1.
     """
     found = sorted(_evidence(root), key=lambda one: (one.generation == GENERATION, not one.certain))
     return replace(found[0], certain=any(one.certain for one in found)) if found else None

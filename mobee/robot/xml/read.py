@@ -56,9 +56,10 @@ MOST_ELEMENTS_2014 = 500  # the time of the rules in pairs_2014.py grows faster
 
 
 def finish_robot(root: Node, draft: Draft, name: str) -> Robot:
-    """Return the robot of a file, joined with the robots that the file includes; raises RobotFileError.
+    """Return the robot of a file, joined with the robots that the file includes.
 
-    `root`: the root element. `draft`: all elements of the file. `name`: name of the robot.
+    `root`: the root element. `draft`: all elements of the file. `name`: name of the robot. Raises RobotFileError if the robot has no body
+    part, or if elements of the file do not fit together (for example, a joint names a motor that does not exist).
     """
     if not draft.parts and not draft.others:
         root.fail("bodypart", "the robot has no body part", 'Put its motors and links inside <bodypart name="...">')

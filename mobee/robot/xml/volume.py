@@ -62,8 +62,8 @@ def read_volume(node: Node) -> Volume:
 def box_rotation(node: Node) -> Array:
     """Return the rotation (3, 3) that a <box> or <convex> element describes.
 
-    The height of the box (its y axis) is along (hx, hy, hz), or along y if these are absent. Its rotation about the height is that of
-    `height_along` with the attribute `angle` [deg], or 0 if this is absent.
+    The height of the box (its y axis) is along (hx, hy, hz), or along y if these are absent. The attribute `angle` [deg], 0 if absent, is
+    the box's rotation about its height. `height_along` defines which rotation has the angle 0.
     """
     return height_along(direction(node, AXIS, (0.0, 1.0, 0.0)), np.deg2rad(node.number("angle", 0.0)))
 
@@ -84,10 +84,10 @@ def height_along(axis: Array, angle: float) -> Array:
 
 
 def height_and_angle(rotation: Array) -> tuple[Array, float]:
-    """Return the axis (unit vector (3,)) and the angle [rad] for which `height_along` places a box as `rotation` (3, 3) does.
+    """Return the height axis (unit vector (3,)) of a box with the rotation (3, 3), and its angle [rad] about this axis.
 
-    If the height axis of `rotation` is more than 120 deg from y, the result is for the box after half a turn about its own x axis, which
-    does not change the box.
+    They are the arguments with which `height_along` returns the same rotation. If the height axis is more than 120 deg from y, the result
+    is for the box after half a turn about its own x axis, which does not change the box.
     """
     if rotation[1, 1] < HALFWAY:
         rotation = rotation * np.array([1.0, -1.0, -1.0])  # the same box
@@ -96,7 +96,10 @@ def height_and_angle(rotation: Array) -> tuple[Array, float]:
 
 
 def angle_about(axis: Array, rotation: Array) -> float:
-    """Return the angle [rad] for which the rotation `height_along(axis, angle)` is nearest to `rotation` (3, 3); `axis` (3,): unit."""
+    """Return the angle [rad] about a box's height axis, unit vector `axis` (3,), that fits the rotation (3, 3) of the box best.
+
+    At this angle the rotation `height_along(axis, angle)` is nearest to `rotation`.
+    """
     rest = height_along(axis, 0.0).T @ rotation
     return float(np.arctan2(rest[0, 2] - rest[2, 0], rest[0, 0] + rest[2, 2]))
 

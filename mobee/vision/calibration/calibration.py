@@ -56,7 +56,10 @@ class Quality:
 
     @classmethod
     def of(cls, pixels: Array, metres: Array) -> Quality:
-        """Return the medians and 95 % quantiles of distances `pixels` (K,) px and `metres` (N,) m; NaN for an empty array."""
+        """Return the medians and 95 % quantiles of distances between the observed and the predicted tag; NaN for an empty array.
+
+        `pixels`: (K,) px, distances of corners in the pictures. `metres`: (N,) m, distances of the middle of the tag in space.
+        """
         found = [np.quantile(one, share) if len(one) else np.nan for one in (pixels, metres) for share in (0.5, 0.95)]
         return cls(*(float(value) for value in found))
 
@@ -65,8 +68,8 @@ class Quality:
 class Unobservable:
     """A direction in the space of the parameters about which the pictures give almost no information.
 
-    `information`: singular value s of this direction, of the derivatives of the residuals by the parameters (residuals in units of the
-    noise, parameters in units of their prior deviations). The pictures reduce the prior deviation along the direction to 1 / sqrt(1 + s^2)
+    It is a singular vector of the Jacobian: the derivatives of the residuals (in units of the noise) by the parameters (in units of their
+    prior deviations). `information`: its singular value s. The pictures reduce the prior deviation along the direction to 1 / sqrt(1 + s^2)
     of its value; s = 0: no information at all. `weights`: components of the direction, a unit vector, by name of the parameter; small
     ones are left out.
     """

@@ -210,8 +210,8 @@ class SelfCalibratingPlant:
         """Reach with a marker of the part to the presented target; return the outcome, with corrected positions.
 
         `stay`: True: the part stays in the pose in which the force ended; False: it returns to the target of its last action. Raises
-        InvalidValue if there is no target. It is also raised if an offset is not 0 and the target prescribes a direction of the marker's
-        normal (`ReachTarget.normal` or `faces`): this direction is not corrected.
+        InvalidValue if there is no target. It is also raised if an estimated encoder offset is not 0 and the target prescribes a direction
+        of the marker's normal (`ReachTarget.normal` or `faces`), because this direction is not corrected.
         """
         if self._target is None:
             raise InvalidValue("no target is presented; call present(ReachTarget(position)) first")

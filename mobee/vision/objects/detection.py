@@ -59,9 +59,10 @@ def outlined(name: str, likeness: NDArray[np.float32]) -> list[Detection]:
     """Return the regions of a picture that show a thing (an object of known shape, size and colour), as detections.
 
     `name`: name of the thing. `likeness`: (H, W), either the share of each pixel that the thing covers, 0 to 1, or larger numbers that are
-    proportional to this share. The share of a pixel is computed as its number divided by the largest number of its region in the 5 x 5
-    pixels around it, or by 1 if the largest number is below 1. Left out are regions of less than 40 pixels, regions with fewer than 16
-    outline points inside the picture's border, and regions that fill less than 60 % of their convex hull.
+    proportional to this share. The share of a pixel is then estimated: its likeness is divided by the largest likeness in the 5 x 5 pixels
+    around it, but never by less than 1. Only pixels connected to it by pixels with a likeness above 0 count. A region is a connected set
+    of pixels with shares of at least 0.5. Left out are regions of less than 40 pixels, regions with fewer than 16 outline points inside
+    the picture's border, and regions that fill less than 60 % of their convex hull.
     """
     height, width = likeness.shape
     found = []

@@ -59,9 +59,10 @@ def upright(yaw: float) -> Array:
 
 
 def surface(kind: Kind, size: Array) -> Array:
-    """Return points (m, 3) m on the surface of a shape, in its own axes.
+    """Return points (m, 3) m on the surface of a shape, in its own axes, relative to its middle.
 
-    They are the corners of a box, the rims of a cylinder, or six points of a sphere. `size`: lengths of the shape, m.
+    They are the corners of a box, points of both rims of a cylinder (its axis is z), or six points of a sphere. `size`: lengths of the
+    shape [m] in the order of `Thing.size`.
     """
     if kind == "box":
         found: Array = _CORNERS * size
@@ -77,7 +78,7 @@ def touching(kind: Kind, size: Array, position: Array, rotation: Array, directio
 
     Args:
         kind: kind of the shape.
-        size: the lengths of the shape, m.
+        size: the lengths of the shape [m], in the order of `Thing.size`.
         position: (3,) m, middle of the shape in the camera's frame; the whole shape must be ahead of the camera.
         rotation: (3, 3), from the shape's axes to the camera's frame.
         directions: unit vectors (K, 2) in the image plane x / z, y / z.

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Lessons of a robot that learns to see: observations of a ball, with the positions that a teacher has reported, and how they are made.
 
-The teacher is a simulated robot that carries the ball to places in a volume; in the learner's postures the ball is in the pictures of its
-cameras.
+Two simulated robots take part. The teacher carries the ball to places in a volume, and reports the ball's position. The learner has
+cameras, and moves torso and head to postures in which both of its cameras see the ball.
 """
 
 from __future__ import annotations

@@ -93,9 +93,10 @@ class Regression:
     """
 
     def __init__(self, lens: Lens, make: Callable[[], Any]) -> None:
-        """Make a localiser that is not fitted yet; `make`: returns a new estimator, which must predict all three coordinates.
+        """Make a localiser that is not fitted yet.
 
-        `lens`: of both cameras.
+        `lens`: of both cameras. `make`: a function without arguments that returns a new estimator, an object with the methods `fit` and
+        `predict` of scikit-learn, which must predict all three coordinates at once, (M, 3).
         """
         self._lens, self._make = lens, make
         self._estimator: Any = None

@@ -97,11 +97,12 @@ class Covariance:
         return total
 
     def with_slopes(self, a: Points, count: Array, scales: Array) -> tuple[Array, Slopes]:
-        """Return the covariance (n, n) of the average rewards of n reaches, and a function that computes its derivatives.
+        """Return the covariance C (n, n) of the average rewards of n reaches, with their noise, and a function for its derivatives.
 
-        `a`: the reaches. `count`: (n,) number of tries over which the reward of each reach is averaged. `scales`: (n, n) factors on the
-        covariances of the mean rewards; 1, or more for two reaches in the same earlier world (`scales_of`). The function takes
-        weights (n, n). It returns the derivatives (8 + d,) of the sum of weights times covariance by the logarithms of the parameters.
+        `a`: the reaches. `count`: (n,) number of tries over which the reward of each reach is averaged. `scales`: (n, n) factors by which
+        the covariances of the mean rewards are multiplied: 1 or more for two reaches in the same earlier world, else 1 (`scales_of`). The
+        function gets weights W (n, n). It returns the derivatives (8 + d,) of the scalar sum(W * C), over all elements, with respect to the
+        logarithms of the parameters.
         """
         value, pair = self._value, np.ix_(a.state, a.state)
         place_far = _squared(a.target, a.target) / value[_PLACE_L] ** 2

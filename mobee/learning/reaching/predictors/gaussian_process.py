@@ -63,8 +63,8 @@ class Posterior:
         target: (n, 3) m, root frame, target of each pair.
         residual: (n,) average reward of each pair, minus its prior mean.
         count: (n,) number of rewards in each average.
-        scales: (n, n) factors of the covariances between the pairs: above 1 for two pairs that were tried in the same earlier world or on
-            the same other robot (`worlds.scales_of`), else 1.
+        scales: (n, n) factors of the covariances between the pairs: 1 or more for two pairs that were tried in the same earlier world or
+            on the same other robot, else 1 (see `covariance.scales_of`).
     """
 
     def __init__(
@@ -284,12 +284,13 @@ class GaussianProcess:
 
 
 def thinned(known: Reached, most: int) -> tuple[Ints, Array, Array, Array, Ints]:
-    """Return state (n,), target (n, 3) m, average reward (n,), number of tries (n,) and world (n,) of the n pairs of state and target.
+    """Return the observed pairs of state and target; if there are more than `most`, merge pairs with near targets.
 
-    States and worlds are numbers; targets are in the root frame. `known`: the reaches observed so far. If there are more than `most` pairs,
-    those of the same state and world whose targets lie in the same cell of a cubic grid are merged into one pair with the average target
-    and reward, weighted by the number of tries. The cells grow until at most `most` pairs remain, or the largest cell (10 m) is reached; so
-    at least one pair of each state and world remains.
+    The results are the state (n,), target (n, 3) m, average reward (n,), number of tries (n,) and world (n,) of each of the n pairs. States
+    and worlds are numbers; targets are in the root frame. `known`: the reaches observed so far. Pairs of the same state and world whose
+    targets lie in the same cell of a cubic grid are merged into one pair with the average target and reward, weighted by the number of
+    tries. The cells grow until at most `most` pairs remain, or the largest cell (10 m) is reached; so at least one pair of each state and
+    world remains.
     """
     state, world, raster, step = known.state, known.world, *RASTER
     which = np.arange(len(known))

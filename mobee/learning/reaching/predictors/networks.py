@@ -127,10 +127,11 @@ def layers(weights: list[Array], biases: list[Array], inputs: Array) -> list[Arr
 
 
 def slopes(weights: list[Array], biases: list[Array], inputs: Array, rewards: Array, copies: Array) -> list[Array]:
-    """Return the derivatives of half the mean squared error of the networks: with respect to the weights of each layer, then to the biases.
+    """Return the derivatives of the error of each network: with respect to the weights of the three layers, then to their three biases.
 
-    `weights`: of the three layers, each (networks, inputs, outputs); `biases`: each (networks, 1, outputs). `inputs`: (networks, n,
-    features), of n reaches. `rewards`: (networks, n), observed. `copies`: (networks, n), weights of the squared errors of the reaches.
+    The error of a network is half the mean over n reaches of the squared error of its predicted reward, times `copies`. The derivatives
+    have the shapes of `weights`, each (networks, inputs, outputs), and `biases`, each (networks, 1, outputs). `inputs`: (networks, n,
+    features). `rewards`: (networks, n), observed. `copies`: (networks, n), how many times each network counts each reach.
     """
     first, second, predicted = layers(weights, biases, inputs)
     out = ((predicted[..., 0] - rewards) * copies)[..., None] * predicted * (1.0 - predicted) / inputs.shape[1]

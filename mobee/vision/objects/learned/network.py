@@ -89,6 +89,8 @@ class Network:
 def network_of(things: Sequence[Thing], first: Layer, second: Layer, third: Layer) -> Network:
     """Return the network with these three layers; a layer is a pair of weights (inputs, outputs) and bias (outputs,).
 
+    `things`: the kinds of objects for which it was trained. The third layer has one output for each of them, in this order.
+
     The 150 inputs of the first layer are a flattened array (2, 3, 5, 5). Its axes are: the set of pixels (0: near, 1: far), colour (red,
     green, blue), row and column. The near pixels are 5 x 5 adjacent ones, the far ones 5 x 5 with a spacing of 5 pixels. Raises
     NotInstalled without ONNX.

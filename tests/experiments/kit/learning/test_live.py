@@ -17,6 +17,7 @@ from experiments.kit.learning.live import (
     contacts,
     counts_of,
     distance,
+    keep_observed,
     learn_live,
     offline_plant,
     variations,
@@ -83,6 +84,9 @@ def test_live_robots_are_held_against_all_offline_seeds_and_a_seed_against_the_o
     for part in TASKS["arms"].parts:
         made(tmp_path / "arms" / "pybullet", part, 9, end=2)
     found = compared(tmp_path, "arms", 4)
+    keep_observed(tmp_path / "arms" / "pybullet", "arms")  # what a record keeps in place of the store
+    (tmp_path / "arms" / "pybullet" / STORE).unlink()
+    assert compared(tmp_path, "arms", 4).live == found.live
     assert [one.variation for one in found.offline] == [0.5, 0.5, 0.5]
     assert (found.live["pybullet"].variation, found.live["pybullet"].agree, found.live["pybullet"].compared) == (1.0, 0.0, 2)
     assert found.counts["pybullet"]["left_arm"].sum() == 8  # as many as the offline seeds made
