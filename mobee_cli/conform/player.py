@@ -110,16 +110,18 @@ class Player:
     # Calls
 
     def call(self, key: str, request: type[Request], reply: type[_R], **fields: Any) -> _R:
-        """Call robot_sim as its controller, and return the reply; raises services.common.rpc.CallFailed.
+        """Call robot_sim as its controller, and return the reply.
 
-        `key`: key of the call on the bus. `request`, `reply`: types of request and reply. `fields`: fields of the request.
+        `key`: key of the call on the bus. `request`, `reply`: types of request and reply. `fields`: fields of the request. Raises
+        services.common.rpc.CallFailed if the call is refused, or if no valid reply comes within 1 s (ANSWER).
         """
         return self.service.call(key, request, reply, timeout=ANSWER, **fields)
 
     def call_as_operator(self, key: str, request: type[Request], reply: type[_R]) -> _R:
         """Call robot_sim as an operator (a person), for calls that a controller may not make; return the reply.
 
-        Raises services.common.rpc.CallFailed. `key`: key of the call on the bus. `request`, `reply`: types of request and reply.
+        `key`: key of the call on the bus. `request`, `reply`: types of request and reply. Raises services.common.rpc.CallFailed if the call
+        is refused, or if no valid reply comes within 1 s (ANSWER).
         """
         return rpc.call(self.service.bus.session, OPERATOR, key, request, reply, timeout=ANSWER)
 

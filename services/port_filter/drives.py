@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Forwards calls, part metadata, emergency stops and the sign that the router runs between robot_sim and its clients.
 
-This sign is the router's liveliness token. The port filter is a process between robot_sim and the clients; it moves the robot back if a motion leads into contact.
+This sign is the router's liveliness token. The port filter is a process between robot_sim and the clients; it moves the robot back if a
+motion leads into contact.
 """
 
 from __future__ import annotations
@@ -22,9 +23,10 @@ from services.common.service import CallRefused, Service
 
 @dataclass(frozen=True, slots=True)
 class Owner:
-    """The client that owns the drive of a part (the right to command its motors), as long as its liveliness token exists.
+    """The client that owns the drive of a part (the right to command its motors).
 
-    `who`: name of the client. `instance`: id of its process.
+    It remains the owner at most as long as its liveliness token (the sign on the bus that it runs) exists. `who`: name of the client.
+    `instance`: id of its process.
     """
 
     who: str
@@ -130,7 +132,7 @@ def _forwarded() -> Iterator[None]:
 
 
 class Forwarder:
-    """Forwards part metadata, emergency stops and the router's liveliness token between the robot and the clients.
+    """Forwards part metadata, emergency stops and the router's liveliness token (sign that it runs) between the robot and the clients.
 
     `service`: connection in the robot's namespace, in which the filter is a client of the robot. `twin`: connection in the namespace of the
     clients (first part of all their keys), in which the filter acts as the robot.

@@ -36,9 +36,10 @@ class Views:
     """Makes copies of recorded messages, in JSON or as ROS 2 messages, which viewers can show."""
 
     def __init__(self, robot: Robot, pose_rate: float, json_rate: float) -> None:
-        """Create the encoders.
+        """Prepare to make copies of the messages of this robot.
 
-        `pose_rate`: copies of the robot's pose per second of real time. `json_rate`: JSON copies of each key per second. 0: none.
+        `pose_rate`: largest number of copies of the robot's pose per second of real time; 0: none. `json_rate`: largest number of JSON
+        copies of each key per second; 0: only single events, such as emergency stops, which are always copied.
         """
         self._robot = robot
         self._model = Model(robot)

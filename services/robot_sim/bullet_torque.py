@@ -43,8 +43,9 @@ class Gears:
 
     A geared motor adds its rotor's inertia and its friction to its joint: (M + INERTIA) a = torque - FRICTION v - bias + outside. M is the
     mass matrix of the arm, v and a are joint velocity and acceleration, and bias is the torque of gravity and Coriolis forces. INERTIA,
-    and FRICTION times the step, are far larger than the inertia of a wrist, so an explicit step of 5 ms would diverge. The external torque `outside` (contacts) is
-    estimated from the last substep: the torque that the joints' acceleration required, minus the torque that the gears transmitted.
+    and FRICTION times the step, are far larger than the inertia of a wrist, so an explicit step of 5 ms would diverge. The external torque
+    `outside` (contacts) is estimated from the last substep: the torque that the joints' acceleration required, minus the torque that the
+    gears transmitted.
     """
 
     def __init__(self, joints: int) -> None:

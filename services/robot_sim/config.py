@@ -113,9 +113,10 @@ class RendererConfig(WorldConfig, frozen=True, kw_only=True):
     """Marker on which a tag is drawn, for `mobee calibrate`; empty: none."""
 
     def check_robot(self, robot: Robot) -> None:
-        """Raise MobeeError if the robot has no camera or no marker `tag`, or if a part's name cannot be used on the bus.
+        """Raise MobeeError if the robot has no camera, or if a part's name cannot be used on the bus.
 
-        It is also raised if `optics` is "dragonfly" and the pictures do not have 320 x 240 pixels.
+        It is also raised if the setting `tag` is not empty and names no marker of the robot, or if `optics` is "dragonfly" and the pictures
+        do not have 320 x 240 pixels.
         """
         super().check_robot(robot)
         require_cameras(robot, cameras_of(robot, self.cameras), 1)

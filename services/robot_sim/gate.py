@@ -144,6 +144,9 @@ class Admission:
     def check_step(self, reference: Array, before: Array | None, ticks: int, q: Array) -> None:
         """Raise Refused if a position command is too far from the last one.
 
+        A motor may step by twice its largest velocity times the time since that command, at least one tick and at most 0.1 s (in lockstep:
+        at most the largest age of a command). Without a last command, the step is at most 2 degrees (MAX_START).
+
         Args:
             reference: commanded position, (n_part,) rad.
             before: position that was commanded `ticks` ago, (n_part,) rad; None: there is none, and the measured position is used.

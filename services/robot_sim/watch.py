@@ -140,12 +140,11 @@ class Counters:
     def numbers(self, missed: int, pairs_watched: int) -> Mapping[str, float]:
         """Return the counts for `stat`, by name.
 
-        Names with "ticks" are numbers of ticks. "age_...": age of the oldest command [ticks], as `age_at` returns
-        it: ticks since the tick from whose state the command was computed. "solid_depth_max" and "gap_min":
-        deepest contact and smallest distance [m]. "stops": number of stops, "stop_time_max" and "stop_distance_max": their largest time [s]
-        and distance [rad]. "overtime_ms_...": delay of a tick's start after its deadline [ms]. "tick_ms_...": computing time of a tick
-        [ms]. `missed`: number of ticks skipped since the start of the process. `pairs_watched`: number of pairs that the simulator tests
-        for contact.
+        Names with "ticks" are numbers of ticks. "age_...": age of the oldest command [ticks], as `age_at` returns it: ticks since the tick
+        from whose state the command was computed. "solid_depth_max" and "gap_min": deepest contact and smallest distance [m]. "stops":
+        number of stops, "stop_time_max" and "stop_distance_max": their largest time [s] and distance [rad]. "overtime_ms_...": delay of a
+        tick's start after its deadline [ms]. "tick_ms_...": computing time of a tick [ms]. `missed`: number of ticks skipped since the
+        start of the process. `pairs_watched`: number of pairs that the simulator tests for contact.
         """
         return {
             "ticks": self.ticks,

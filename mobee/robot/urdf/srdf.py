@@ -56,8 +56,8 @@ def find_srdf(urdf: Path, robot: str) -> Path | None:
 def read_srdf(path: Path, tree: Tree) -> Srdf:
     """Return the content of an SRDF file; warns of links, joints and groups that the robot does not have.
 
-    `tree`: links and joints of the robot's URDF. Raises RobotFileError if the file cannot be read, is not an SRDF file, has too many groups
-    or lacks a required attribute.
+    `tree`: links and joints of the robot's URDF. Raises RobotFileError if the file cannot be read, is not an SRDF file, has too many
+    groups, or has a missing or faulty attribute.
     """
     root = read_xml(path)
     if root.tag != "robot":
