@@ -229,7 +229,7 @@ def choose_home(states: Mapping[str, State], asked: str | None, srdf: Path | Non
         name = lower.get(asked.lower(), ZERO)
         return Home(name, states.get(name, {}), meant=True)
     known = next((lower[name] for name in HOMES if name in lower), None)
-    name = known or (next(iter(states)) if len(states) == 1 else ZERO)
+    name = known or (next(iter(states)) if len(states) == 1 else lower.get(ZERO, ZERO))
     return Home(name, states.get(name, {}), meant=name.lower() == HOMES[0])
 
 

@@ -37,8 +37,9 @@ RESTING, LYING = state("resting", shoulder=0.3), state("lying", shoulder=0.4)
         ((RESTING, STANDING), 0.1),
         ((RESTING,), 0.3),
         ((RESTING, LYING), 0.0),
+        ((RESTING, LYING, state("Zero", shoulder=0.7)), 0.7),
     ],
-    ids=["home", "a known name", "a known name among others", "the only one", "none of two"],
+    ids=["home", "a known name", "a known name among others", "the only one", "none of two", "zero"],
 )
 def test_which_group_state_is_home(tmp_path: Path, lines: tuple[str, ...], shoulder: float) -> None:
     assert read(tmp_path, *lines).home.tolist() == [shoulder, 0, 0]
