@@ -15,7 +15,7 @@ from services.controller.forces import load_terms
 
 
 class Config(ServiceConfig, frozen=True, kw_only=True):
-    """The controller's settings."""
+    """The settings of the controller: its control law, its commands, and user-defined forces. Each field has its own text below it."""
 
     gains: Literal["default", "derived", "published_2014"] = "published_2014"
     """Name of the set of gains of the control law; the model must use the same set."""

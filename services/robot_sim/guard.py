@@ -246,7 +246,10 @@ class Guard:
                 self._service.bus.event("error", "estop_record", f"the stop holds, but {self._record.path} was not written: {error}")
 
     def _stop_all(self, stop: Stop) -> None:
-        """Stop the gates, and publish the stop until it is reset."""
+        """Put the gates of all parts (the last checks of commands before the motors) into the state estop, and publish the stop.
+
+        In this state a gate brakes its motors and obeys no command. The stop is published periodically until it is reset.
+        """
         self._stop_gates(stop)
         self._repetition.cancel()  # of a stop that was reset less than a period ago
         self._repeat_stop()

@@ -305,7 +305,10 @@ def figure(folder: Path) -> Path:
 
 
 def _through_ball() -> Array:
-    """Return poses on the edge through the ball, (T, n) rad."""
+    """Return T poses (T, n) rad on the straight line from the vertex RIGHT of the roadmap to the vertex LEFT.
+
+    On this edge of the roadmap the hand would pass through the ball.
+    """
     space = new_map().space
     q = np.repeat(robot().home[None], STEPS, axis=0)
     shares = np.linspace(0.0, 1.0, STEPS)[:, None]

@@ -156,7 +156,10 @@ def _errors(name: str) -> str:
 
 
 def _medians(groups: Groups, name: str) -> list[float]:
-    """Return the median error of each robot, cm."""
+    """Return the median error in each run [cm], the distance of located from true positions.
+
+    `name`: name of the localiser.
+    """
     return [1e2 * float(np.median(run[_errors(name)])) for run in groups["katana"]]
 
 

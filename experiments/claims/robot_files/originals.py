@@ -115,7 +115,10 @@ def results(folder: Path) -> dict[str, Any]:
 
 
 def _row_of(original: Original, path: Path, poses: int, seed: int) -> dict[str, str]:
-    """Load and compare one file; returns its row of the table."""
+    """Load an original file, compare it with its reading by the rules of MoBeE of 2014, and return its row of the table.
+
+    `poses`: number of random poses in which the contacts of both readings are compared.  `seed`: of the poses.
+    """
     row = dict.fromkeys(COLUMNS, "") | {"kind": original.kind, "hash": original.hash, "date": original.date}
     row |= {"file": f"{original.repository}: {original.path}"}
     with warnings.catch_warnings():

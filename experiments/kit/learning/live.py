@@ -331,9 +331,10 @@ class Contacts:
 
     @classmethod
     def of(cls, space: Lattice, seen: Ints, touched: NDArray[np.bool_]) -> Contacts:
-        """Count the actions in transitions `seen` (T, 3), rows of state, action, state reached.
+        """Return the counts of all actions together: how many missed their goals, ended in contact, or both.
 
-        `touched`: (T,), whether each action ended in contact with an object of the world.
+        `seen`: transitions (T, 3), a row for each action: state, action, state reached.  An action misses if the state reached is not its
+        goal in `space`.  `touched`: (T,), whether each action ended in contact with an object of the world.
         """
         missed = seen[:, 2] != space.goals[seen[:, 0], seen[:, 1]]
         return cls(int(missed.sum()), int(touched.sum()), int((missed & touched).sum()), len(seen))
