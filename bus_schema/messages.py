@@ -171,7 +171,8 @@ class Order(Struct, frozen=True, forbid_unknown_fields=True):
 class Answer(Struct, frozen=True, forbid_unknown_fields=True):
     """Answer of the controller to a tick, as a field of `Commands`, in lockstep (each tick waits for all participants).
 
-    Its fields have the same meaning as in `StepDone`.
+    `ok` False: an input was missing. `busy`: services that have nothing to decide, because all their parts are moving. `including`:
+    participants whose answers to that tick the controller has used. The fields are those of `StepDone`.
     """
 
     ok: bool

@@ -339,7 +339,7 @@ class Controller:
         return Forces(**{**more, **forces})
 
     def _evaluated(self, q: Array) -> Pose:
-        """Return the pose at q, without contacts of the hands that reach with targets."""
+        """Return the pose at q; its contacts leave out those between a target and a hand that is reaching."""
         return self._track.evaluate(q, self._reaches.markers[:MAX_HANDS]) if self._reaches else self._track.evaluate(q)
 
     def _add_client(self, q: Array, total: Array) -> None:

@@ -249,8 +249,8 @@ class Cameras:
     def shares(self, name: str, postures: Sequence[Array], objects: int) -> Floats:
         """Return which share of each pixel each object covers, 0 to 1, (height, width, objects), for the first `objects` of the world.
 
-        `name` and `postures` are those of `expose`: the camera, and the positions of all motors (n,) rad at each of the `moments`.
-        `objects`: number of objects.
+        `name`: name of the camera. `postures`: the positions of all motors (n,) rad at each of the moments (`moments`) of one exposure; the
+        shares are means over these moments. `objects`: number of objects.
         """
         camera, scene = self._scene.cameras[name], self._scene
         found = np.zeros((self.settings.height * self.settings.width, objects), np.float32)

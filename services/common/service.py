@@ -303,7 +303,10 @@ class Service(Listener):
             handler(who, instance, up)
 
     def _join(self, router: str) -> None:
-        """Record the router; if a second one appears, ask which one answers: a service must not join a system that started later."""
+        """Record the id of the router whose presence is on the bus; if a second id appears, start calls that show which router is alive.
+
+        A service stays in the system in which it started: it must not join one whose router started later.
+        """
         if not self._router:
             self._router = router
         elif router != self._router:
@@ -314,10 +317,11 @@ class Service(Listener):
                 self._ask_router()
 
     def _ask_router(self) -> None:
-        """Ask the launcher and the router for their status, to find out whose tokens of a router (presence signals) are on the bus.
+        """Call launcher and router for their status, to find out whether a router of another system is alive.
 
-        The call repeats itself once a second as long as there is a token that is neither of this service's router nor known to belong to no
-        process: a new system may be starting there. `_check_system` handles the answers.
+        Other routers are seen by their tokens (presence signals) on the bus. A token may also be left of a router that has ended. The calls
+        are repeated once a second while there are tokens of other routers, except those that are known to be left over. `_check_system`
+        handles the answers.
         """
         others = self.alive["router"] - self._strays - {self._router}
         self._is_asking = bool(others)

@@ -101,7 +101,10 @@ class GoalServer:
         return started
 
     def _follow(self, part: str, follow: Follow) -> None:
-        """Move the attractor of a part as its owner asks, which ends an action; a message of an earlier owner has no effect."""
+        """Move the attractor of a part (the position that attracts its motors) as the message `follow` of its owner requests.
+
+        The part's present action ends. A message of an earlier owner has no effect.
+        """
         action, motors = self._actions[part], self._robot.motor_table[self._robot.part(part).slice]
         if action.owner is None or action.owner.epoch != follow.epoch or action.is_in_hold:
             return

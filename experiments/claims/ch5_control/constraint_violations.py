@@ -188,7 +188,10 @@ def _summary(state: Search) -> dict[str, Any]:
 
 
 def _searches(found: Cells) -> list[Search]:
-    """Return the searches by gain set, those without forces of a client first."""
+    """Return the finished searches (each for the motion that violates a clause most), sorted by their set of gains.
+
+    Of one set, the searches without forces of a client program come first.
+    """
     states = [Search(**result.values) for result in found.values()]
     return sorted(states, key=lambda state: (GAINS.index(state.gains), state.forced, state.seed))
 

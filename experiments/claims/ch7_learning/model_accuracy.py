@@ -203,10 +203,11 @@ def findings(found: Cells) -> dict[str, Any]:
 
 
 def truth_error(truth: OutcomeModel) -> float | None:
-    """Return the expected L1 error of the walks' estimate of the true outcomes, which has few tries; mean over the stochastic actions.
+    """Return how inexact the true outcomes are known: the expected L1 error of their estimate, mean over the stochastic actions.
 
-    `truth`: the estimate, or a table that defines the outcomes; then the error is 0.  Returns None if no action is stochastic.  A
-    stochastic action has no outcome with a probability of 0.9 or more.
+    True outcomes are shares in a limited number of tries, so they have a sampling error.  `truth`: these estimates, or a table that defines
+    the outcomes; then the error is 0.  Returns None if no action is stochastic.  A stochastic action has no outcome with a probability of
+    0.9 or more.
     """
     stochastic = most_likely(truth) < CERTAIN
     if not stochastic.any():

@@ -53,8 +53,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """Measure the robots that are not in the records in `folder` yet, and return the results of all.
+    """Measure how well the library works with each robot (`Measured`), and return the results of all.
 
+    Robots that are already in the records in `folder` are not measured again.
     Raises InvalidValue if example-robot-data or pybullet_data is needed and missing.
     """
     examples = arguments.data or examples_folder()

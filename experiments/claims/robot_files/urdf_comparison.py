@@ -175,7 +175,7 @@ class PeerFailed(Exception):
 
 
 class UrdfPeer:
-    """The robot of a URDF file as Pinocchio reads it; its methods take joint positions in the order of this library."""
+    """The robot of a URDF file as Pinocchio reads it; its methods take joint positions in MoBeE's order, that of `Robot.joints`."""
 
     def __init__(self, path: Path, robot: Robot) -> None:
         """Read the file.  `robot`: the same file as this library reads it.

@@ -365,7 +365,10 @@ def contacts(folder: Path, task: str) -> dict[str, dict[str, Contacts]]:
 
 
 def contact_rows(folder: Path, task: str) -> dict[str, dict[str, int]]:
-    """Return the counts of `contacts` as a table: for each row title "robot, part" a dict from the column title to the count."""
+    """Return how the actions of each part on each robot ended, as a table: a dict from the row title "robot, part" to a row.
+
+    A row is a dict with four counts: all actions, those that missed their goals, those that ended in contact with an object, and both.
+    """
     return {
         f"{robot}, {part}": {
             "actions": one.actions,

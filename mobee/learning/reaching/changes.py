@@ -76,10 +76,11 @@ class RunLength:
         return self._decided()
 
     def _decided(self) -> int | None:
-        """Return the number of outcomes in a new run in which a larger share of outcomes contradicts what was learned, else None.
+        """Return the number of outcomes since a change that is now certain, if the world contradicts more of them than before; else None.
 
-        A run is the time between two changes. It is new if it began after the last certain run, with a probability above 0.5, and its share
-        differs with a probability of at least CERTAIN (0.95). Then it becomes the certain run, also if its share is smaller.
+        A run is the time between two changes; its share is the part of its outcomes that contradicts what was learned. A change is certain
+        if a run began after the last certain change with a probability above 0.5, and its share differs from that before with a
+        probability of at least CERTAIN (0.95). A certain change to a smaller share is recorded too, but returns None.
         """
         probability = self._weight.sum(axis=1)
         later = self._start > self._known

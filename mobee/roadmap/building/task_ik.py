@@ -88,7 +88,7 @@ class TaskIK:
         return violations, costs
 
     def _reals(self, y: Array) -> Array:
-        """Return the aims (residuals for least squares) that require the task coordinates y (N, m), as numbers for the compiled core.
+        """Return the aims (residuals for least squares) that are 0 at the task coordinates y (N, m), as numbers for the compiled core.
 
         Row k has the numbers for y[k], as `mobee.roadmap.ik.solve.aim_reals` orders them.
         """

@@ -63,9 +63,10 @@ class _Problem:
         return found
 
     def linear(self, x: Array) -> tuple[Array, Array, Array]:
-        """Return residuals (N, rows) px, their derivatives (N, rows, P), and how they vary together, (N, 2, rows, rows).
+        """Return residuals (N, rows) px, their derivatives by the parameters (N, rows, P), and two covariance matrices, (N, 2, rows, rows).
 
-        The first is their covariance by the noise of the encoders, px^2, the second by an error of the stamp of 1 s.
+        The first covariance is that by the noise of the encoders, px^2. The second is that by a standard deviation of 1 s of the stamp (the
+        time of the picture), px^2 per s^2; the caller multiplies it by the variance of the stamps.
         """
         count, cameras = self.corners.shape[:2]
         residuals = np.zeros((count, cameras, 8))
