@@ -151,9 +151,10 @@ class Observer:
         """Return a dict from the part to its states so far, and the ages [s] of the commands obeyed; keep only the last state of each part.
 
         If a command was computed from the state of tick m, and the robot obeys it in tick k, then its age is the time between the
-        beginnings of ticks m and k.  The returned age is a lower bound, which ends at the beginning of tick k - 1.  Robot_sim publishes tick k
-        only after its gate (the last check before the motors) has checked the command of this tick.  On a busy machine much time may pass
-        between this check and the message, and it would be counted as age.  A command has no age if tick m or k - 1 was not received.
+        beginnings of ticks m and k.  The returned age is a lower bound, which ends at the beginning of tick k - 1.  Robot_sim publishes
+        tick k only after its gate (the last check before the motors) has checked the command of this tick.  On a busy machine much time
+        may pass between this check and the message, and it would be counted as age.  A command has no age if tick m or k - 1 was not
+        received.
         """
         with self.lock:
             taken, self.parts = self.parts, {part: states[-1:] for part, states in self.parts.items()}
