@@ -64,7 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
             require_none(arguments, "only valid without --live; with it robot and world are those of the running system")
             from mobee_cli.calibrate_live import calibrated_live
 
-            found, drawn = calibrated_live(arguments.endpoint, arguments.marker, arguments.postures, arguments.seed), None
+            found, drawn = calibrated_live(arguments.endpoint, arguments.marker, rig_of, arguments.postures, arguments.seed), None
         else:
             found, drawn = _offline(arguments)
         try:

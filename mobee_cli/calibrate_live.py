@@ -8,7 +8,7 @@ import logging
 import os
 import signal
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,7 +30,6 @@ from mobee.vision.imperfections import CameraSettings
 from mobee.vision.lens import Lens
 from mobee.vision.rig import Rig
 from mobee.vision.tag import find_tag
-from mobee_cli.calibrate import rig_of
 from mobee_cli.connect import connected
 from mobee_cli.errors import UserError
 from services.common import rpc
@@ -46,6 +45,7 @@ WHO = f"mobee_calibrate_{os.getpid()}"
 REST = 0.4  # s of wall-clock time for which the robot rests in a posture
 TRIES = 5  # of a motion that a hold interrupts
 FIRST_PICTURE = 15.0  # s for the first picture
+RigOf = Callable[[Robot, str, CameraSettings], Rig]
 
 
 class Shot(NamedTuple):
@@ -82,10 +82,11 @@ class Pictures:
             del self._parts[old]
 
 
-def calibrated_live(endpoint: str, marker: str, count: int, seed: int) -> Calibration:
+def calibrated_live(endpoint: str, marker: str, rig_of: RigOf, count: int, seed: int) -> Calibration:
     """Calibrate the robot of the system at `endpoint` by moving its hand with an AprilTag, and return the calibration.
 
-    `marker`: name of the marker (point on a link) at the palm with the tag. `count`: number of postures. `seed`: chooses the postures.
+    `marker`: name of the marker (point on a link) at the palm with the tag. `rig_of(robot, marker, settings)`: function that returns the
+    robot with its cameras and the tag. `count`: number of postures. `seed`: chooses the postures.
     Raises UserError if no system runs, or if it sends no pictures.
     """
     with connected(endpoint) as session:

@@ -25,7 +25,7 @@ from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
 from mobee_cli.connect import connected
 from mobee_cli.errors import UserError
-from mobee_cli.reach import Choose, Setup
+from mobee_cli.reach_setup import Choose, Setup
 from services.common import rpc
 from services.common.bus_plant import BusPlant
 from services.common.config import ServiceConfig

@@ -29,9 +29,8 @@ from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
 from mobee_cli.connect import connected
 from mobee_cli.errors import UserError
-from mobee_cli.roadmap.play import report, require_free
 from mobee_cli.roadmap.progress import Progress
-from mobee_cli.roadmap.query import find_path
+from mobee_cli.roadmap.query import find_path, require_free
 from services.common import rpc
 from services.common.bus_follow import BusFollower
 from services.common.config import ServiceConfig
@@ -56,10 +55,11 @@ class Running:
     service: Service
 
 
-def play_live(trm: Roadmap, arguments: argparse.Namespace) -> int:
+def play_live(trm: Roadmap, arguments: argparse.Namespace) -> tuple[Roadmap, dict[str, Any], Played, Gains]:
     """Move the robot of the running system from its present pose along a path of the roadmap to the goal in `arguments`.
 
-    Prints the result and returns the exit code.
+    Returns the roadmap in the world of the running system, the planned path (as `mobee_cli.roadmap.query.find_path` returns it), the motion
+    along it, and the gains of the running control law.
     """
     if arguments.start is not None:
         raise UserError("--from is only valid offline: with --live the path begins where the robot is", BAD_INPUT)
@@ -83,7 +83,7 @@ def play_live(trm: Roadmap, arguments: argparse.Namespace) -> int:
         finally:
             progress.end()
             plant.let_go()
-    return report(trm, found, played, running.gains, arguments)
+    return trm, found, played, running.gains
 
 
 def _played(plant: BusFollower, running: Running, found: dict[str, Any], speed: float, progress: Progress) -> Played:

@@ -18,7 +18,7 @@ from mobee.roadmap.roadmap import Roadmap
 from mobee_cli.connect import add_endpoint
 from mobee_cli.errors import UserError
 from mobee_cli.roadmap.map_file import PLACES, add_map, add_places, map_given, start_of, wrapped
-from mobee_cli.roadmap.query import find_path
+from mobee_cli.roadmap.query import find_path, require_free
 from mobee_cli.roadmap.show import marker_of
 from services.common.exit_codes import BAD_INPUT, FAILED
 
@@ -74,7 +74,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.live:
         from mobee_cli.roadmap.live import play_live
 
-        return play_live(trm, arguments)
+        return report(*play_live(trm, arguments), arguments)
     path = find_path(trm, start_of(trm, arguments.start), arguments.to)
     require_free(trm, path, arguments.anyway)
     gains = Gains.named(arguments.gains)
@@ -93,12 +93,6 @@ def report(trm: Roadmap, path: dict[str, Any], played: Played, gains: Gains, arg
         found["picture"] = str(_filmstrip(trm, played, arguments.picture))
     print(json.dumps(found, indent=2) if arguments.json else "\n".join(_lines(trm, found)))
     return 0 if found["arrived"] else FAILED
-
-
-def require_free(trm: Roadmap, path: dict[str, Any], anyway: bool) -> None:
-    """Raise UserError if the path (as returned by `mobee_cli.roadmap.query.find_path`) has contacts, unless `anyway` is True."""
-    if not path["free"] and not anyway:
-        raise UserError(f"the path has contacts: {path['why']} --anyway moves along the shortest path nevertheless", FAILED)
 
 
 def result_of(trm: Roadmap, path: dict[str, Any], played: Played, tolerance: float) -> dict[str, Any]:

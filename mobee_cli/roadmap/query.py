@@ -87,6 +87,12 @@ def find_path(trm: Roadmap, start: Array, goal: list[float]) -> dict[str, Any]:
     }
 
 
+def require_free(trm: Roadmap, path: dict[str, Any], anyway: bool) -> None:
+    """Raise UserError if the path (as returned by `find_path`) has contacts, unless `anyway` is True."""
+    if not path["free"] and not anyway:
+        raise UserError(f"the path has contacts: {path['why']} --anyway moves along the shortest path nevertheless", FAILED)
+
+
 def _shortest(trm: Roadmap, start: Array, goal: list[float]) -> list[int]:
     try:
         return trm.vertex_path(start, goal)
