@@ -14,29 +14,25 @@ marker away from every target.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from mobee._core import ROW_BYTES
 from mobee._core import engine as core
 from mobee.arrays import Array
 from mobee.errors import UnknownName
 from mobee.model.contact import ContactTable
-from mobee.model.core_tables import Carried, robot_tables
+from mobee.model.core_tables import VOLUME, Carried, Volumes, robot_tables, volume_row
+from mobee.model.world_object import Role, WorldObject
 from mobee.robot.robot import Robot, per_robot
 
 if TYPE_CHECKING:
     from mobee.model.model import Model, Reaching
     from mobee.model.pose import Pose
-from functools import lru_cache
-from types import MappingProxyType
-
-from numpy.typing import NDArray
-
-from mobee.model.core_tables import VOLUME, Volumes, volume_row
-from mobee.model.world_object import Role, WorldObject
 
 OBSTACLE, TARGET, GHOST, ATTACHED, ATTACHED_GHOST = range(5)
 _FREE: dict[Role, int] = {"obstacle": OBSTACLE, "target": TARGET, "ghost": GHOST}
