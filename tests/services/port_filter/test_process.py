@@ -6,6 +6,7 @@ from __future__ import annotations
 import logging
 import signal
 from collections.abc import Callable, Iterator
+from functools import partial
 
 import numpy as np
 import pytest
@@ -69,6 +70,9 @@ class Client:
         assert self.state is not None
         return np.array(self.state.q)
 
+    def is_near(self, q: Array) -> bool:
+        return bool(np.abs(self.q - q).max() < NEAR)
+
     @property
     def gate(self) -> str:
         assert self.state is not None
@@ -107,6 +111,12 @@ class Client:
 
     def until(self, condition: Callable[[], bool], what: str, timeout: float = 10.0) -> None:
         wait_for(lambda: self.tick() and condition(), what, timeout)
+
+    def happens(self, condition: Callable[[], bool], timeout: float) -> bool:
+        """Whether a condition becomes true within `timeout` seconds of the robot's time."""
+        end = self.bus.t + timeout * 1e9
+        self.until(lambda: condition() or self.bus.t > end, "the robot's time", 10.0 * timeout)
+        return condition()
 
     def go(self, motor: int, degrees: float) -> None:
         """A position move, then a short rest; ends early when the gate does not obey any more."""
@@ -182,20 +192,42 @@ def test_one_program_drives_the_robot_and_its_filtered_twin(client: Callable[[st
     assert mine.call(keys.drive("torso", "release"), WithEpoch, Driven, epoch=mine.epoch).gate == "idle"
 
 
+def undo(mine: Client, motion: Callable[[], Array], during: Callable[[], None] = lambda: None) -> None:
+    """Repeat a motion into the table until the reflex undoes it, back to the pose that `motion` returns.
+
+    On a busy machine commands may come too late: then the gate holds first, or the robot comes too deep into the table.
+    """
+    for _ in range(TRIES):
+        mine.answer()
+        mine.arm()
+        mine.events.clear()
+        begun = motion()
+        mine.until(lambda: mine.gate == "hold", "the end of the motion")
+        if not mine.happens(mine.has_event("reflex"), 1.0):
+            continue
+        during()
+        is_back = partial(mine.is_near, begun)
+        if mine.happens(mine.has_event("motion_failed"), 10.0) and mine.happens(is_back, 2.0):
+            return
+    raise AssertionError(f"the reflex undid none of {TRIES} motions: {mine.events}")
+
+
 def test_a_motion_into_the_table_is_undone_and_reported_to_its_client(client: Callable[[str], Client]) -> None:
     mine = client(FILTERED)
-    mine.arm()
-    mine.go(YAW, 4.0)
-    mine.go(PITCH, 40.0)
-    assert mine.gate == "hold"
-    assert mine.q[PITCH] < np.deg2rad(15.0)
-    with pytest.raises(CallFailed, match="reflex") as refused:
-        mine.call(keys.drive("torso", "take"), Take, Taken, instance="c1")
-    assert refused.value.code == "reflex"
-    mine.until(mine.has_event("motion_failed"), "the end of the reflex")
-    assert mine.has_event("reflex")()
-    begun = np.deg2rad([4.0, 0.0, 0.0])  # where this move began, not the one before
-    mine.until(lambda: bool(np.abs(mine.q - begun).max() < NEAR), "the robot back where it came from")
+
+    def motion() -> Array:
+        mine.go(PITCH, 0.0)
+        mine.go(YAW, 4.0)
+        mine.go(PITCH, 40.0)
+        return np.deg2rad([4.0, 0.0, 0.0])  # where this move began, not the one before
+
+    def during() -> None:
+        assert mine.q[PITCH] < np.deg2rad(15.0)
+        with pytest.raises(CallFailed, match="reflex") as refused:
+            mine.call(keys.drive("torso", "take"), Take, Taken, instance="c1")
+        assert refused.value.code == "reflex"
+
+    undo(mine, motion, during)
     mine.arm()
     mine.go(YAW, 0.0)
     assert mine.gate == "armed"
@@ -203,14 +235,17 @@ def test_a_motion_into_the_table_is_undone_and_reported_to_its_client(client: Ca
 
 def test_in_another_modality_the_reflex_goes_back_to_a_waypoint_set_by_a_call(client: Callable[[str], Client]) -> None:
     mine = client(FILTERED)
-    mine.arm()
-    mine.drive(YAW, FAST, lambda: bool(mine.q[YAW] > np.deg2rad(5.0)))
-    mine.drive(YAW, 0.0, lambda: mine.bus.k % 30 == 0)
-    here = mine.q
-    mine.answer()
-    mine.drive(PITCH, FAST, lambda: False)
-    mine.until(mine.has_event("motion_failed"), "the end of the reflex")
-    mine.until(lambda: bool(np.abs(mine.q - here).max() < NEAR), "the robot back at its waypoint")
+
+    def motion() -> Array:
+        mine.go(PITCH, 0.0)
+        mine.drive(YAW, FAST, lambda: bool(mine.q[YAW] > np.deg2rad(5.0)))
+        mine.drive(YAW, 0.0, lambda: mine.bus.k % 30 == 0)
+        here = mine.q
+        mine.answer()
+        mine.drive(PITCH, FAST, lambda: False)
+        return here
+
+    undo(mine, motion)
 
 
 def test_a_robot_that_starts_in_contact_moves_when_a_client_accepts_the_pose(client: Callable[[str], Client]) -> None:
