@@ -108,9 +108,10 @@ def damaged(path: Path, what: str) -> MobeeError:
 
 
 def json_of(path: Path, what: str, text: object) -> Any:
-    """Return the value of a JSON text that was read from the file `path`; raises MobeeError if `text` is not JSON.
+    """Return the value of a JSON text that was read from a data file; raises MobeeError if the text is not valid JSON.
 
-    `what`: name of the value in the message.
+    `path`: the file. `what`: name of the value, such as "the setting seed". Both are only used in the message of the error. `text`: the
+    JSON text; the error is also raised if it is not a str, because then the file was damaged.
     """
     try:
         if isinstance(text, str):

@@ -118,8 +118,8 @@ _rows_end = function("rows_end", ADDRESS)
 _evaluate = function("evaluate", ADDRESS, ADDRESS, result=INTEGER)
 evaluate_one = function("evaluate_one", result=INTEGER)
 """Evaluate one pose in the compiled core and return the number of its contacts. Arguments: `Room.asked`, and the pose q (n,) rad as bytes
-of float64. At most `Room.most` contacts are written into `Room.rows`, the projection of the contacts to the motors into `Room.torque`. The
-argument types are not declared, because this is faster."""
+of float64. The contacts are written into `Room.rows`, unless there are more than `Room.most`. The projection of the contacts to the motors
+is written into `Room.torque`. The argument types are not declared, because this is faster."""
 _link_poses = function("link_poses", ADDRESS, BYTES, INTEGER, ADDRESS)
 _jacobians = function("jacobians", ADDRESS, BYTES, INTEGER, INTEGER, BYTES, ADDRESS)
 _neighbours_new = function("neighbours_new", REAL, INTEGER, result=ADDRESS)
@@ -178,11 +178,16 @@ def jacobians(of: Handle, q: Array, link: int, point: Array) -> Array:
 
 
 class Room:
-    """Buffers in which the core evaluates poses, for one thread at a time; they are reused, because allocation takes longer than one pose.
+    """Buffers in which the core (the compiled library) evaluates poses, that is, finds their contacts; for one thread at a time.
 
-    `motors`: the number n of motors. `rows`: buffer into which `evaluate_one` writes contacts. `most`: number of contacts for which `rows`
-    has space. `torque`: buffer for the projection of the contacts to the motors, (n,) m^2/rad. `asked`: the first argument of the compiled
-    function `evaluate_one`.
+    They are reused, because to allocate them takes longer than to evaluate a pose. `motors`: the number n of motors. To evaluate many
+    poses, call `evaluate`. To evaluate one pose, call `ask`, then the function `evaluate_one` of this module, which uses four attributes.
+
+    `asked`: pointer to the inputs of `evaluate_one` except the pose: scene, reaching hands and `cut` (set by `ask`), and the addresses of
+    the buffers. `rows`: buffer for c contacts: the integers of all contacts, (c, 6) int64, then their real numbers, (c, 7) float64; the
+    columns are those of `mobee.model.contact.ContactTable`. `most`: number of contacts for which `rows` has space. `torque`: (n,) m^2/rad,
+    buffer for the projection of the contacts to the motors: the sum of J^T (depth * normal) over the contacts of fields (volumes that cause
+    repulsive forces), as in `evaluate`. It is not yet in the unit of a torque: the control law multiplies it by the gain `contact_gain`.
     """
 
     __slots__ = ("_at", "_handle", "_request", "asked", "most", "rows", "torque")
@@ -194,7 +199,7 @@ class Room:
         """The projection of the contacts of fields to the motors, (n,) m^2/rad, into which `evaluate_one` writes."""
         self._request = _RequestOfOne(room=self._at, torque=address(self.torque))
         self.asked = ctypes.byref(self._request)
-        """The first argument of `evaluate_one`: scene, hands and buffers, set by `ask` and `make_space`."""
+        """Pointer to the inputs of `evaluate_one`, its first argument: scene, hands and `cut` (set by `ask`), addresses of the buffers."""
         self.make_space(MANY)
 
     def evaluate(self, scene: Handle, q: Array, hands: Sequence[int], cut: bool, threads: int) -> tuple[Ints, Array, Array]:

@@ -61,10 +61,14 @@ finite.
 class DebiasedCounts(ctypes.Structure):
     """The structure `DebiasedCounts` of core/observations.cpp: outcome probabilities from observed outcomes and a weak prior.
 
-    Imagined counts, which thesis Algorithms 6 and 8 add without an observation, do not enter the probabilities. `probabilities`: (S, A, B),
-    for each state-action the probability of each of B bins (a bin holds one outcome); the function `believe` of this module updates them.
-    `prior` (B,): the prior's count of each bin. `total`: the sum of the prior. `at`: address of the structure, which keeps the arrays
-    alive.
+    The probability of an outcome is (observations of the outcome + its prior count) / (observations of all outcomes + sum of the prior
+    counts), for one state-action. The counts of a transition model (`OutcomeCounts`) also contain imagined counts: counts of outcomes that
+    were not observed, with which each state-action starts (thesis Algorithms 6 and 8). They do not enter these probabilities.
+
+    `probabilities`: (S, A, B), for each state-action the probability of each of B bins (a bin holds one outcome); the function `believe` of
+    this module updates them. `prior` (B,): the prior count of each bin. `total`: the sum of `prior`. `at`: memory address of the structure,
+    an argument of `believe`. The structure contains only the addresses of the two arrays; therefore this Python object refers to the
+    arrays, so that they are not freed while it exists.
     """
 
     _fields_ = (("probability", ADDRESS), ("prior", ADDRESS), ("sum", REAL))

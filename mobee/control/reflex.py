@@ -256,10 +256,12 @@ class Reflex:
         self._keep_place(q)
 
     def tick(self, q: Array, violations: Sequence[Violation]) -> Array | None:
-        """Advance by one tick at the measured pose q (n,) rad; return the reflex's target pose (n,) rad, or None in state "forward".
+        """Advance the state machine by one tick; return the pose that the reflex commands, (n,) rad, or None if the client commands.
 
-        `violations`: the violations of this pose. While the robot brakes, the target is the pose at which braking began; while it is stuck,
-        the last target.
+        `q`: (n,) rad, measured pose. `violations`: the violations of this pose. The result depends on the state after this tick (see the
+        class). "forward": None, because the client commands the robot. "brake": the pose in which braking began. "rewind": the next pose on
+        the path back along the recorded poses; in one tick each motor moves at most by `max_velocity` * `dt`. "dead" and "stuck": the
+        same pose as in the tick before.
         """
         violated, recovery = self._judge(violations), self.recovery
         if self.state == "forward" or recovery is None:

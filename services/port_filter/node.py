@@ -202,7 +202,13 @@ class FilterNode:
         return Done(v=VERSION)
 
     def _answer(self, k: int) -> None:
-        """In lockstep, answer robot_sim after all clients of the filter have answered."""
+        """Wait until the filter's clients have answered tick `k`, then send the filter's own answer to robot_sim; only used in lockstep.
+
+        `k`: number of the tick. In lockstep, robot_sim (the process that simulates the robot and counts the ticks) begins the next tick
+        after all services have answered the present one. An answer is a `StepDone` message: the sender has published all its messages for
+        the tick. If a client does not answer within the time `patience` of the configuration, the filter's answer has `ok` = False: the run
+        is not repeatable. Nothing is sent until all services in `participants` of the configuration have once been present in the run.
+        """
         self._complete = self._complete or not self._barrier.absent()
         if self._complete:
             self._is_waiting = True

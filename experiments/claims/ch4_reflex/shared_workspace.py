@@ -57,10 +57,15 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return a condition of the sweep for each protection of the two robots: none, reflexes of MoBeE 1.0, or controllers of MoBeE 2.0.
+    """Return the five conditions of the experiment; each one protects the iCub and the Katana from collisions by another method.
 
-    The names are the keys of PROTECTIONS.  Runs with controllers last --minutes of robot time (with --quick: 0.2 minutes); runs with
-    another protection last a third of that time.
+    A condition is a name with the settings of `trial`, which runs once for each condition and seed.  The names are the keys of PROTECTIONS.
+    "none": no protection.  "reflexes-in-step", "reflexes-out-of-step": each robot has a reflex of MoBeE 1.0, which moves it back along its
+    recent poses after a contact; both reflexes are equally fast, or that of the Katana is a quarter as fast.  "one-reflex": one reflex
+    moves both robots back.  "controllers": each robot has a controller of MoBeE 2.0.
+
+    `arguments`: the parsed options of the command line.  Runs with controllers last `arguments.minutes` of robot time, or 0.2 minutes if
+    `arguments.quick` is True.  Runs with another protection last a third of that time.
     """
     minutes = QUICK_MINUTES if arguments.quick else arguments.minutes
     return [

@@ -295,7 +295,12 @@ def summary(robot: Robot, fit: Fit) -> dict[str, Any]:
 
 
 def encoder_noise(fit: Fit) -> float:
-    """Return the root mean square of the noise of all encoders [rad], for ticks of 20 ms (NOISE_PERIOD)."""
+    """Return one standard deviation of the encoder noise for the whole robot [rad]: the root mean square over the encoders of all motors.
+
+    `fit`: the fitted motors; its field `noise` (n,) rad is the standard deviation of each encoder.  Both are values for control periods
+    (ticks) of 20 ms (NOISE_PERIOD).  In the motor model the noise depends on the tick: for a tick of dt [s] its standard deviation is
+    sqrt(0.02 / dt) times this value.
+    """
     return float(np.sqrt(np.square(fit.noise).mean()))
 
 

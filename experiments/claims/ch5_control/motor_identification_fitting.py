@@ -41,9 +41,10 @@ class Fit:
 
     `parameters`: fitted motor parameters.  `deviation`: dict from a parameter's name ("lag", "delay", "backlash", "friction") to its
     standard deviations (n,) in s, s, rad and rad/s.  `noise`: standard deviation of the encoder noise, for ticks of 20 ms (NOISE_PERIOD),
-    (n,) rad.  `chi_square`: chi-square of the fitted responses per degree of freedom, (n,); 1 if the residuals are only encoder noise.
-    `misfit`: rms difference between the measured mean response and the fitted model, after the mean square of the noise was subtracted,
-    (n,) rad.  `held_out_chi_square` and `held_out_misfit`: the same for signals that were not fitted.
+    (n,) rad; for a tick of dt [s] it is sqrt(0.02 / dt) times this value.  `chi_square`: chi-square of the fitted responses per degree of
+    freedom, (n,); 1 if the residuals are only encoder noise.  `misfit`: rms difference between the measured mean response and the fitted
+    model, after the mean square of the noise was subtracted, (n,) rad.  `held_out_chi_square` and `held_out_misfit`: the same for signals
+    that were not fitted.
     """
 
     parameters: MotorParameters

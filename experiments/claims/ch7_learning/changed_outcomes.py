@@ -128,8 +128,8 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     unchanged actions, then the mean value (discounted sum of expected information gains) of the changed and of the unchanged actions
     [nats].  `at_change`: the mean L1 error of the changed actions against their new outcomes, before any transition in the changed world.
     `changed`, `same`: the masks (S, A) of `compare`.  Raises InvalidValue if no action is changed.  `settings`: "change", a key of CHANGES;
-    "explorer"; "forgetting", the factor with which the agent forgets; "transitions", their number before the change, and after it.  `seed`:
-    of agent and plant.
+    "explorer", the rule by which the agent chooses actions, "curious" or "least_tried"; "forgetting", the factor with which the agent
+    forgets; "transitions", their number before the change, and after it.  `seed`: of agent and plant.
     """
     change, known = settings["change"], truths(settings["change"])
     changed, same = compare(*known)

@@ -101,13 +101,18 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 
 
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Explore until every action was tried, at most 20 000 transitions.
+    """Let an agent explore with the left arm until it has tried every action of every state, for at most 20 000 transitions.
 
-    Returns `state_actions`, the number of actions; `floor`, the length of the shortest walk that takes each of them; `new_actions` (E,),
-    the indices (from 1) of the transitions that tried an action for the first time; `new_states`, 0 for the state at the start, then the
-    indices (from 1) of the transitions that reached a state for the first time; `transitions`, their number; and `failed`, the share of
-    transitions that did not end in the goal of their action.  `settings`: "explorer"; "graph", a key of GRAPHS; "world", one of WORLDS;
-    "discount".  `seed`: of agent, graph and plant.
+    `settings`: dict with four keys.  "explorer": one of the strings in EXPLORED_BY, such as "curious"; it names the rule by which the agent
+    chooses actions.  "graph": "nearest" or "equidistant"; the actions of a state lead to its 16 nearest states, or to the states one level
+    away along one joint.  "world": "constrained" or "free", the arm with or without cable constraints and self-contacts.  "discount": the
+    discount factor of future rewards in the agent's plan, at least 0 and below 1.  `seed`: of the random numbers of agent, graph and plant
+    (the simulated robot).
+
+    Returns a dict.  "state_actions": number of actions, summed over the states.  "floor": number of actions in the shortest walk that takes
+    each of them (`shortest_walk`).  "new_actions" (E,): the indices (from 1) of the transitions that tried an action for the first time.
+    "new_states": 0 for the state at the start, then the indices (from 1) of the transitions that reached a state for the first time.
+    "transitions": number of transitions.  "failed": share of the transitions that did not end in the goal state of their action.
     """
     space = arm_space(neighbours=GRAPHS[settings["graph"]], tie_seed=seed)
     plant = arm_plant(seed, free=settings["world"] == "free")

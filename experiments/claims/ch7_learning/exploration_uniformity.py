@@ -62,7 +62,8 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Explore one graph with one explorer; returns the transitions `seen` (T, 3): state, action, state reached.
 
-    `settings`: "graph", one of GRAPHS; "explorer"; "transitions", their number.  `seed`: of agent and plant.
+    `settings`: "graph", one of GRAPHS; "explorer", the rule by which the agent chooses actions, one of EXPLORERS; "transitions", their
+    number.  `seed`: of agent and plant.
     """
     space, plant = space_of(settings["graph"]), arm_plant(seed)
     begin_anywhere(space, plant, seed)

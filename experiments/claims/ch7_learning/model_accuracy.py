@@ -187,10 +187,15 @@ def error_curve(world: str, truth: OutcomeModel, seen: Ints) -> Array:
 def findings(found: Cells) -> dict[str, Any]:
     """Return the results as a dict with two keys, "runs" and "claims".
 
-    "runs" is a dict from "world; explorer" to a row for the models after all transitions: "seeds", the number of runs;
-    "stochastic_actions", the number of actions whose most likely outcome has a probability below 0.9; the errors in COLUMNS; and
-    "error_of_estimated_truth_stochastic", the error of the estimated true outcomes themselves (`truth_error`).  "claims" is a list with the
-    claims, their measured values and their verdicts, as dicts (`Claim.record`).
+    `found`: the results of the finished runs.  "runs" is a dict from "world; explorer", such as "arm, 81 states; curious", to a dict of
+    numbers about the transition models that this explorer had learned at the end of its runs in this world:
+    - "seeds": number of runs.
+    - "stochastic_actions": number of actions whose most likely outcome has a probability below 0.9.
+    - the names in COLUMNS: errors of the models, which `errors` describes; interquartile means over the runs.  None: not known.
+    - "error_of_estimated_truth_stochastic": error of the outcome probabilities with which the models are compared, for the stochastic
+      actions.  For the arm they are not exact, because they are frequencies in a limited number of tries (`truth_error`).
+
+    "claims" is a list with the claims, their measured values and their verdicts, as dicts (`Claim.record`).
     """
     known = truths(found)
     last = {key: curves[:, -1] for key, curves in errors(found, known).items()}
@@ -203,11 +208,11 @@ def findings(found: Cells) -> dict[str, Any]:
 
 
 def truth_error(truth: OutcomeModel) -> float | None:
-    """Return how inexact the true outcomes are known: the expected L1 error of their estimate, mean over the stochastic actions.
+    """Return the expected L1 error of the outcome probabilities that are used as the truth; the mean over the stochastic actions.
 
-    True outcomes are shares in a limited number of tries, so they have a sampling error.  `truth`: these estimates, or a table that defines
-    the outcomes; then the error is 0.  Returns None if no action is stochastic.  A stochastic action has no outcome with a probability of
-    0.9 or more.
+    `truth`: these probabilities.  If they were measured by walks (`Truth`), they are frequencies in a limited number of tries, so they have
+    a sampling error.  If a table defines them, the error is 0.  Returns None if no action is stochastic.  A stochastic action has no
+    outcome with a probability of 0.9 or more.
     """
     stochastic = most_likely(truth) < CERTAIN
     if not stochastic.any():

@@ -46,7 +46,8 @@ def conditions(arguments: argparse.Namespace) -> list[Condition]:
 def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     """Explore with one explorer, and record the expected reward [nats] of every action after each number of transitions in `times`.
 
-    Returns `rewards` (times, actions) and `times`.  `settings`: "explorer" and "times".  `seed`: of agent and plant.
+    Returns `rewards` (times, actions) and `times`.  `settings`: "explorer", the rule by which the agent chooses actions, one of EXPLORERS;
+    "times", a list of numbers of transitions.  `seed`: of agent and plant.
     """
     space, plant = arm_space(neighbours=ARM_NEIGHBOURS), arm_plant(seed)
     begin_anywhere(space, plant, seed)

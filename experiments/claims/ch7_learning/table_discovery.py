@@ -90,9 +90,10 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
     Returns for each part `seen_PART` (T, 3), the transitions: state, action, state reached; `settled_PART` (T,), False after a timeout;
     `durations_PART` (T,) [s]; and `ends_PART` (T,) [s], the plant time at the end.  For each arm also `touch_ARM` (T,), whether an action
-    ended within 2 cm of the table or ghost, and `forward_ARM` (T,), whether the torso was bent forward then.  `settings`: "explorer";
-    "world", "table" or "ghost"; "propagate", "tree" if a contact force acts on all motors from the link down to the base, "part" if only on
-    those of the link's part; "transitions", the number for each agent.  `seed`: of agents and plant.
+    ended within 2 cm of the table or ghost, and `forward_ARM` (T,), whether the torso was bent forward then.  `settings`: "explorer", the
+    rule by which the agents choose actions, one of EXPLORERS; "world", "table" or "ghost"; "propagate", "tree" if a contact force acts on
+    all motors from the link down to the base, "part" if only on those of the link's part; "transitions", the number for each agent.
+    `seed`: of agents and plant.
     """
     count = settings["transitions"]
     plant = table_plant(seed, settings["world"] == "ghost", settings["propagate"])

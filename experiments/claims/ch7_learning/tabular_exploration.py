@@ -109,7 +109,8 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     once; `often`, the number until all were tried five times; `most`, the limit, which replaces `once` or `often` if that did not happen;
     `finished`, two booleans, whether all were tried once, and five times; and `error`, the result of `distance`.  "return" returns `best`,
     the mean reward per action under the best policy; `share`, the mean reward divided by it; and `earned`, the sum of rewards at 100 times.
-    `settings`: "task"; "world", a key of WORLDS; "explorer"; and for "return" its parameter "number".  `seed`: of agent and world.
+    `settings`: "task", "coverage" or "return"; "world", a key of WORLDS; "explorer", the rule by which the agent chooses actions, one of
+    COVERAGE or, for "return", a key of RETURN; and for "return" the explorer's parameter "number".  `seed`: of agent and world.
     """
     world = WORLDS[settings["world"]](seed)
     plant = RewardedPlant(world, seed)

@@ -193,10 +193,13 @@ class UrdfPeer:
         self._columns = self._moving_joints()
 
     def _moving_joints(self) -> list[tuple[int, int]]:
-        """Return for each joint of the robot its first column in Pinocchio's configuration vector, and its number of columns.
+        """Return for each joint of the robot the index of its first element in Pinocchio's configuration vector, and its element count.
 
-        The other joints with one column, which this library does not move, get the lower limit of their range in `_neutral`.  Raises
-        PeerFailed if Pinocchio has not all joints.
+        The joints are in the order of `Robot.joints`.  A joint has one element, its position [rad or m], or two, the cosine and the sine of
+        its angle.  The method also sets the attribute `_neutral`, the configuration from which `_configuration` takes the elements of all
+        joints that only Pinocchio's model has, because this library does not move them.  Such a joint is at the lower limit of its range if
+        it has one element, otherwise at Pinocchio's neutral position.  Raises PeerFailed if Pinocchio's model does not have all joints of
+        the robot.
         """
         self._neutral = self._pin.neutral(self._model)
         known = {joint.name for joint in self._robot.joints}

@@ -112,9 +112,11 @@ def space(law: str = "default") -> Lattice:
 
 @cache
 def hands(law: str = "default") -> Array:
-    """Return the position of the right palm in each state of `space`, (S, 3) m, root frame, with the wrist at home.
+    """Return the position of the right palm in each state of the right arm's lattice, (S, 3) m, root frame, with the wrist at home.
 
-    `law`: "default" with today's robot, or "published" with the robot of 2014.
+    The S = 81 states are those of the lattice that the function `space` returns for the same law.  `law`: name of the control law, which
+    here only selects the robot: "default": today's robot; "published": the robot of 2014.  Every call with the same law returns the same
+    object.
     """
     found: Array = Model(body(law)).evaluate(_poses(law)).position(MARKER)
     return found
@@ -122,17 +124,20 @@ def hands(law: str = "default") -> Array:
 
 @cache
 def jacobians(law: str = "default") -> Array:
-    """Return the derivatives of the right palm's position by the four joints in each state of `space`, (S, 3, 4) m/rad.
+    """Return the Jacobians of the right palm's position in all states of the right arm's lattice, (S, 3, 4) m/rad, root frame.
 
-    `law`: "default" with today's robot, or "published" with the robot of 2014.
+    The S = 81 states are those of the lattice that the function `space` returns for the same law.  The four columns are the derivatives by
+    the angles of shoulder pitch, shoulder roll, shoulder yaw and elbow (RIGHT); all other motors are at home.  `law`: name of the control
+    law, which here only selects the robot: "default": today's robot; "published": the robot of 2014.  Every call with the same law returns
+    the same object.
     """
     return Model(body(law)).jacobian(_poses(law), MARKER)[:, :3, _motors(law)]
 
 
 def _poses(law: str) -> Array:
-    """Return the pose of the robot in each state of `space(law)`, (S, n) rad; motors outside the lattice are in the home posture.
+    """Return the pose of the robot in each state of the lattice `space(law)`, (S, n) rad; motors outside the lattice are at home.
 
-    `law`: "default" with today's robot, or "published" with the robot of 2014.
+    `law`: name of the control law, which here only selects the robot: "default": today's robot; "published": the robot of 2014.
     """
     poses = np.tile(body(law).home, (len(space(law)), 1))
     poses[:, _motors(law)] = space(law).samples
@@ -147,8 +152,8 @@ def arm_plant(seed: int, world: World | None = None, motors: MotorParameters | N
     """Return an offline plant (the robot simulated in this process) in which only the four motors of the right arm move.
 
     `seed`: seed of the plant's random numbers.  `world`: objects around the robot; None: an empty world.  `motors`: parameters of the
-    simulated motors, such as their delay; None: the default ones.  `law`: "default" with today's robot, or "published" with the robot of
-    2014.
+    simulated motors, such as their delay; None: the default ones.  `law`: name of the control law, which also selects the robot: "default":
+    today's robot; "published": the robot of 2014.
     """
     chosen = laws()[law]
     return OfflinePlant(Model(body(law), world), seed, chosen.gains, motors, chosen.dt, active=RIGHT)
@@ -158,8 +163,8 @@ def arm_belief(world: World | None = None, cables: bool = True, turns: Array | N
     """Return the model of robot and world with which a planner plans motions of the right arm.
 
     `world`: as the planner believes it to be; None: empty.  `cables`: whether it knows the cable constraints.  `turns`: (4,) rad, error of
-    the encoders as the planner believes it: believed minus measured joint angles; None: 0.  `law`: "default" with today's robot, or
-    "published" with the robot of 2014.
+    the encoders as the planner believes it: believed minus measured joint angles; None: 0.  `law`: name of the control law, which also
+    selects the robot: "default": today's robot; "published": the robot of 2014.
     """
     clauses = [clause for clause in body(law).clauses if clause.part == PART] if cables else []
     return PeerBelief(Model(body(law), world), RIGHT, MARKER, clauses, laws()[law].gains, turns)
@@ -168,8 +173,8 @@ def arm_belief(world: World | None = None, cables: bool = True, turns: Array | N
 def learned_transitions(plant: OfflinePlant, seed: int, transitions: int = TRANSITIONS, law: str = "default") -> TransitionModel:
     """Return the transition model that a curious agent learns on the plant without a target.
 
-    `seed`: seed of the agent.  `transitions`: number of transitions that the agent makes.  `law`: "default" with today's robot, or
-    "published" with the robot of 2014.
+    `seed`: seed of the agent.  `transitions`: number of transitions that the agent makes.  `law`: name of the control law of the plant,
+    which also selects the robot: "default": today's robot; "published": the robot of 2014.
     """
     agent = CuriousAgent(space(law), plant, seed=seed)
     agent.run(transitions)
@@ -179,8 +184,8 @@ def learned_transitions(plant: OfflinePlant, seed: int, transitions: int = TRANS
 def reach_agent(plant: ReachPlant, model: TransitionModel, seed: int, law: str = "default") -> ReachAgent:
     """Return the reach learner: it predicts rewards by a Gaussian process, and remembers failed transitions for each target position.
 
-    `model`: transition model that the agent continues to learn (thesis 9.4.1).  `seed`: seed of the agent.  `law`: the control law of the
-    plant: "default" (and today's robot), or "published" (and the robot of 2014).
+    `model`: transition model that the agent continues to learn (thesis 9.4.1).  `seed`: seed of the agent.  `law`: name of the control law
+    of the plant, which also selects the robot: "default": today's robot; "published": the robot of 2014.
     """
     where = {"hands": hands(law), "jacobians": jacobians(law)}
     return LEARNERS["gp-ucb"].agent(space(law), plant, marker=MARKER, model=model, seed=seed, **where)

@@ -207,10 +207,12 @@ class NES:
             self._follow(z)
 
     def _follow(self, z: Array) -> None:
-        """Update the distribution of "full" or "separable" by the samples z (population, d), the lowest cost first.
+        """Update the mean, the step size and the shape of the search distribution; used if `method` is "full" or "separable".
 
-        The length of the evolution path (the weighted sum of recent steps of the mean) changes the step size `sigma`. The path and all
-        samples change the shape matrix; the samples with negative weights are scaled to the average length first.
+        `z`: (population, d), the standard normal vectors from which `ask` computed the last samples, that of the lowest cost first; d is
+        the number of variables. The mean moves by the weighted sum of the better half of the samples. The length of the evolution path (a
+        weighted sum of recent steps of the mean) changes the step size `sigma`. The path and all samples change the shape matrix, which is
+        diagonal for "separable". For this, vectors z with negative weights are first scaled to the length sqrt(d).
         """
         rates, d = self._rates, len(self.mean)
         positive = np.maximum(rates.weights, 0.0)
@@ -226,7 +228,11 @@ class NES:
         self.shape = turned(self.shape, directions, np.concatenate([[rates.rank_one], rates.rank_all * weights]), shrink)
 
     def _follow_published(self, z: Array) -> None:
-        """Update by the published forms: the trace of the gradient changes the step size, the remainder the shape."""
+        """Update the mean, the step size and the shape of the search distribution as published; used if `method` is "xnes" or "snes".
+
+        `z`: as for `_follow`. For "xnes", the trace of the natural gradient (d, d) changes the step size `sigma`, and the remainder changes
+        the shape matrix. For "snes", the gradient changes the diagonal shape matrix, and `sigma` stays 1 (Glasmachers et al. 2010).
+        """
         u, d = self._utilities, len(self.mean)
         self.mean = self.mean + self.sigma * self._scale * stretched(self.shape, u @ z)
         if self.shape.ndim == 1:

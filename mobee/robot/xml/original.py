@@ -372,9 +372,13 @@ def free_name(name: str, taken: dict[str, Node] | Counter[str]) -> str:
 
 
 def _mark_base(root: Node) -> None:
-    """Mark the links and joints that belong to the robot's base; MoBeE of 2014 did not test the base for contacts with the world.
+    """Write the attribute `base` ("true" or "false") into the <link> and <joint> elements of an old robot file, in place.
 
-    See `near_root`. The attribute `base` is written only where the value differs from the one that the element inherits.
+    The shapes of an element with base="true" are never tested for contacts with world objects. An element gets this value if it is near
+    the root of the tree: on the path from the element up to the root, the tag changes between <link> and <joint> at most twice (exact rule:
+    `mobee.robot.pairs_2014.near_root`). MoBeE of 2014 did not test these elements either. The attribute is left out where the reader of
+    robot files assumes the right value without it: for a <joint> "false"; for a <link> the value of the nearest <link> or <joint> around
+    it, or "true" if there is none. `root`: the root element of the file.
     """
     parents: list[int] = []
     tags: list[str] = []

@@ -202,16 +202,20 @@ class SelfCalibratingPlant:
         return self._corrected(part, outcome)
 
     def present(self, target: ReachTarget | None) -> None:
-        """Set the target of the next reach; None: remove the target."""
+        """Set the target of the next reaches; None: remove the target."""
         self.plant.present(target)
         self._target = target
 
     def reach(self, part: str, marker: str, stay: bool = False) -> ReachOutcome:
-        """Reach with a marker of the part to the presented target; return the outcome, with corrected positions.
+        """Reach with a marker to the target that `present` has set; return the outcome, computed from corrected encoder values.
 
-        `stay`: True: the part stays in the pose in which the force ended; False: it returns to the target of its last action. Raises
-        InvalidValue if there is no target. It is also raised if an estimated encoder offset is not 0 and the target prescribes a direction
-        of the marker's normal (`ReachTarget.normal` or `faces`), because this direction is not corrected.
+        In a reach, a force pulls the marker to the target, until the part has settled or a time limit is over; then the force ends. `part`:
+        name of the part that moves. `marker`: name of the marker, a point on a link of the part. `stay`: True: the part stays in the pose
+        that it has at the end of the force; False: it returns to the target of its last action. If an estimated encoder offset is not 0,
+        `q` and `after.q` of the outcome are encoder values plus offsets, (n_part,) rad, and `marker` and `missing` are computed from this
+        `q`. Raises InvalidValue if no target is set. It is also raised if an estimated offset is not 0 and the target prescribes a
+        direction of the marker's normal (`ReachTarget.normal` or `faces`), because this direction is not corrected. Raises
+        ActionInterrupted if a hold (a safe stop), a fault or a restart of the robot ends the reach.
         """
         if self._target is None:
             raise InvalidValue("no target is presented; call present(ReachTarget(position)) first")
