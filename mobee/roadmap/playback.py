@@ -16,7 +16,7 @@ from mobee.model.contact import Contact
 from mobee.model.kinematics import tables
 from mobee.model.model import Model
 from mobee.roadmap.edges import Flags
-from mobee.robot.motor_units import fine_units
+from mobee.robot.motor_units import fine_units, motor_units
 from mobee.robot.robot import Robot
 from mobee.simulation import OfflinePlant
 
@@ -184,11 +184,15 @@ _HARD = 0.8  # share of its largest force that a spring may use to follow the mo
 class Played:
     """The motion of a robot along a path, one row for each of T ticks.
 
-    `times`: (T,) s. `wanted`, `q`: (T, n) rad, planned and real positions. `solid`, `field`: (T,) m, depth of the deepest contact of solids
+    Distances between positions are in rad; the whole range of a motor that slides counts as 200 deg (`mobee.robot.motor_units`).
+
+    `units`: (n,), the motion of each motor, in its own unit, that counts as 1 rad. `times`: (T,) s. `wanted`, `q`: (T, n) rad or m, planned
+    and real positions. `solid`, `field`: (T,) m, depth of the deepest contact of solids
     and of fields (larger shapes around solids that cause repulsive forces), 0 without a contact. `rested`: whether the robot came to rest.
     `deepest`: the solid contacts of the pose in which `solid` was largest.
     """
 
+    units: Array
     times: Array
     wanted: Array
     q: Array
@@ -225,11 +229,11 @@ class Played:
 
     @property
     def _q(self) -> Array:
-        return self.q[:, self._moved]
+        return (self.q / self.units)[:, self._moved]
 
     @property
     def _wanted(self) -> Array:
-        return self.wanted[:, self._moved]
+        return (self.wanted / self.units)[:, self._moved]
 
 
 def play(
@@ -272,7 +276,7 @@ def play(
     q, encoders = (np.concatenate([getattr(one, name) for one in traces]) for name in ("q", "encoders"))
     solid, field = (np.concatenate([getattr(one, name) for one in traces]) for name in ("solid", "field"))
     times: Array = plant.dt * np.arange(1.0, len(q) + 1.0)
-    return Played(times, at(wanted, times), q, solid, field, rested, touched_most(model, encoders, solid))
+    return Played(motor_units(model.robot), times, at(wanted, times), q, solid, field, rested, touched_most(model, encoders, solid))
 
 
 def watched(model: Model, wanted: Reference, times: Array, q: Array, rested: bool) -> Played:
@@ -283,7 +287,7 @@ def watched(model: Model, wanted: Reference, times: Array, q: Array, rested: boo
     depths = np.zeros((2, len(q)))  # solids, fields
     table = model.track().evaluate(q).table
     np.maximum.at(depths, (table.kind, table.pose), table.depth)
-    return Played(times, at(wanted, times), q, depths[0], depths[1], rested, touched_most(model, q, depths[0]))
+    return Played(motor_units(model.robot), times, at(wanted, times), q, depths[0], depths[1], rested, touched_most(model, q, depths[0]))
 
 
 def touched_most(model: Model, q: Array, solid: Array) -> tuple[Contact, ...]:

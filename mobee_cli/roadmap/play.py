@@ -15,6 +15,7 @@ from mobee import constraint_forces
 from mobee.control.gains import Gains
 from mobee.roadmap.playback import SPEED, Played, play
 from mobee.roadmap.roadmap import Roadmap
+from mobee.robot.motor_units import slides
 from mobee_cli.connect import add_endpoint
 from mobee_cli.errors import UserError
 from mobee_cli.roadmap.map_file import PLACES, add_map, add_places, map_given, start_of, wrapped
@@ -98,6 +99,8 @@ def report(trm: Roadmap, path: dict[str, Any], played: Played, gains: Gains, arg
 def result_of(trm: Roadmap, path: dict[str, Any], played: Played, tolerance: float) -> dict[str, Any]:
     """Return the result of a motion as plain JSON data; lengths in m, angles in rad, times in s.
 
+    In distances between positions the whole range of a motor that slides counts as 200 deg (`mobee.robot.motor_units`).
+
     `path`: the planned path, as returned by `mobee_cli.roadmap.query.find_path`. `played`: the motion along it. `tolerance`: largest
     remaining error of the marker [mm] at which the robot has arrived.
 
@@ -132,16 +135,18 @@ def result_of(trm: Roadmap, path: dict[str, Any], played: Played, tolerance: flo
 def held_off(trm: Roadmap, path: dict[str, Any], played: Played, gains: Gains) -> dict[str, Any]:
     """Return the motor that ended farthest from its goal, and the strongest constraint force on it in the last pose.
 
-    Keys of the result: "farthest": name of the motor, one that the path moves. "held_by": "its limit", "a constraint of the robot" or "a
+    Keys of the result: "farthest": name of the motor, one that the path moves. "farthest_error": its distance from the goal, in its own
+    unit (rad or m). "held_by": "its limit", "a constraint of the robot" or "a
     field in contact" (a field is a volume around a link that causes repulsive forces); None if no such force exceeds 0.5 rad/s^2. `path`:
     the planned path, as returned by `mobee_cli.roadmap.query.find_path`. `played`: the motion along it, with the `gains`.
     """
     off = np.abs(played.q[-1] - path["poses"][-1]) * (np.ptp(path["poses"], axis=0) > 0.0)
-    motor = int(off.argmax())
+    motor = int((off / played.units).argmax())
     forces = constraint_forces(trm.model.evaluate(played.q[-1]), gains)
     strengths = {"its limit": forces.limits, "a constraint of the robot": forces.constraints, "a field in contact": forces.collision}
     why, force = max(((name, abs(float(one[motor]))) for name, one in strengths.items()), key=lambda pair: pair[1])
-    return {"farthest": trm.model.robot.motors[motor], "held_by": why if force > MIN_FORCE else None}
+    held_by = why if force > MIN_FORCE * played.units[motor] else None
+    return {"farthest": trm.model.robot.motors[motor], "farthest_error": float(off[motor]), "held_by": held_by}
 
 
 def _lines(trm: Roadmap, found: dict[str, Any]) -> list[str]:
@@ -152,9 +157,14 @@ def _lines(trm: Roadmap, found: dict[str, Any]) -> list[str]:
     error, tolerance = 1e3 * found["remaining_error"], 1e3 * found["tolerance"]
     away = f"the remaining error of {marker} is {error:.1f} mm (tolerance {tolerance:g} mm)"
     lines = wrapped(f"{verdict} at {trm.format_coordinates(np.array(found['place']))} after {found['seconds']:.1f} s{moving}: {away}.")
-    lines += wrapped(f"The motor farthest from its goal is {found['farthest']}, by {found['missing']:.3f} rad{held}.")
+    robot = trm.model.robot
+    motor = robot.motor_table[robot.motors.index(found["farthest"])]
+    left = f"{1e3 * found['farthest_error']:.1f} mm" if slides(robot, motor) else f"{found['farthest_error']:.3f} rad"
+    lines += wrapped(f"The motor farthest from its goal is {found['farthest']}, by {left}{held}.")
     off, lag = found["off"], found["lag"]
-    lines += wrapped(f"Largest distance of a motor from the path: {off:.3f} rad; from its planned position at the time: {lag:.3f} rad.")
+    counted = " (the range of a slide counts as 200 deg)" if any(slides(robot, one) for one in robot.motor_table) else ""
+    text = f"Largest distance of a motor from the path: {off:.3f} rad; from its planned position at the time: {lag:.3f} rad{counted}."
+    lines += wrapped(text)
     if found["solid"] > 0.0:
         lines += wrapped(f"Solids touched, by {1e3 * found['solid']:.1f} mm at most: {', '.join(found['touched'])}.")
     else:

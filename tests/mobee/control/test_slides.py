@@ -15,6 +15,7 @@ from mobee.control.gains import Gains
 from mobee.control.law import Law, largest_step
 from mobee.errors import InvalidValue
 from mobee.model.model import Model
+from mobee.roadmap.playback import play
 from mobee.robot.motor_units import SLIDE_RANGE
 from mobee.robot.robot import Clause, Robot
 from mobee.simulation import MotorParameters, OfflinePlant
@@ -124,3 +125,14 @@ def test_a_robot_rests_at_a_home_in_a_limit_zone_that_ends_there(home: float) ->
 
     assert drift(ends=False) > 4.0
     assert drift(ends=True) < 0.5
+
+
+def test_distances_of_a_motion_count_in_the_unit_of_the_slide() -> None:
+    path = np.array([[0.0, 0.0, 0.0], [0.6, -0.5, 0.4]])
+    turning, sliding = (play(Model(robot), path * unit) for robot, unit in ((TURNING, np.ones(3)), (SLIDING, UNITS)))
+    assert sliding.units == pytest.approx(UNITS)
+    assert 0.001 < turning.lag < 0.05
+    for name in ("lag", "off"):
+        assert getattr(sliding, name) == pytest.approx(getattr(turning, name), abs=0.004)  # the encoder noise of slides is smaller
+    last = np.abs(sliding.q[-1] - sliding.wanted[-1])
+    assert sliding.missing == pytest.approx((last / UNITS).max())
