@@ -171,7 +171,7 @@ def measure(settings: Settings) -> dict[str, Any]:
       moving part holds [ms].  Statistics are dicts with the keys "count", "p50" and "p95" (percentiles), and "max".
     - "back_s": statistics of the times from the end of a schedule's last fault until all parts follow commands again [s].
     - "transitions": dict with numbers of transitions of the agents.  "kept": on disk.  "lost": published, but not on disk.  "differing": on
-      disk with other values than published, or published twice with different values.  "gaps": on disk under a number that another
+      disk with other values than published, or published twice with different values.  "repeated": on disk under a number that another
       transition of the same agent has too.
     - "broken": list with a text for each broken guarantee.  The guarantees are: in a run the tick number increases; no motor is faster than
       the gate (the check of commands before the motors) allows; no command is obeyed more than 100 ms after the tick that it answers; all
@@ -182,7 +182,7 @@ def measure(settings: Settings) -> dict[str, Any]:
     "passed" is True if all of these conditions hold:
     - No guarantee is broken.
     - Every part that had to hold did so.
-    - The numbers "lost", "differing" and "gaps" are 0.
+    - The numbers "lost", "differing" and "repeated" are 0.
     - Faults reduce the transitions per second by at most a fifth, if the settings have a quiet period for the comparison.
     - The 95th percentiles of "hold_ms" are at most 30 ms ("kill") and 120 ms ("freeze"), and the maximum of "back_s" is at most 5 s.  Times
       are not judged if the load of the machine was above 1, or if the robot ran in lockstep (every tick waits for all services).
@@ -230,7 +230,7 @@ def _result(
     broken = [f"schedule {row['seed']}: {line}" for row in rows for line in row["broken"]]
     quiet = load <= QUIET and back["count"] == len(rows)
     in_time = all(held[kind]["p95"] is None or held[kind]["p95"] <= most for kind, most in HOLD_AT_MOST.items())
-    unharmed = not broken and not never and kept.lost == kept.differing == kept.gaps == 0
+    unharmed = not broken and not never and kept.lost == kept.differing == kept.repeated == 0
     cost = None if rates is None else 1.0 - rates[1] / max(rates[0], 1e-9)
     return {
         "schedules": settings.schedules,
@@ -249,7 +249,7 @@ def _result(
             who: {"survived": sum(lasted for one, lasted in actions if one == who), "of": sum(one == who for one, _ in actions)}
             for who in ("agent", "model")
         },
-        "transitions": {"kept": kept.kept, "lost": kept.lost, "differing": kept.differing, "gaps": kept.gaps},
+        "transitions": {"kept": kept.kept, "lost": kept.lost, "differing": kept.differing, "gaps": kept.repeated},
         "broken": broken,
         "rows": rows,
         "times_judged": quiet,

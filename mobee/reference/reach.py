@@ -45,7 +45,7 @@ WEAK = 0.05  # of the error's force that acts on the motors: below it the pose c
 CURVED = 1e-3  # relative to the size of J E J^T: the smallest curvature that counts
 NUDGE = 0.1  # rad, out of a singular pose
 PROBE = 1e-4  # rad, step of finite differences
-NOTHING = 1e-12  # m^2/s: the size of J E J^T for a marker that no motor moves
+NOTHING = 1e-12  # the least divisor: a distance [m], or the size of J E J^T [m^2/s] for a marker that no motor moves
 
 
 @dataclass(slots=True, eq=False)

@@ -248,13 +248,13 @@ class Kept:
     """Counts of the transitions of agents in a store on disk, compared with the published ones.
 
     `kept`: on disk.  `lost`: published, but not on disk.  `differing`: on disk with other values than published, or published twice with
-    different values.  `gaps`: surplus transitions on disk, whose number another transition of the same agent has, too.
+    different values.  `repeated`: surplus transitions on disk, whose number another transition of the same agent has, too.
     """
 
     kept: int
     lost: int  # published and not kept
     differing: int  # kept otherwise than published
-    gaps: int  # numbers that occur twice on disk
+    repeated: int  # numbers that occur twice on disk
 
 
 def compare_transitions(observer: Observer, run_dir: Path, agents: list[str]) -> Kept:
@@ -265,19 +265,19 @@ def compare_transitions(observer: Observer, run_dir: Path, agents: list[str]) ->
     """
     with observer.lock:
         published, conflicts = dict(observer.published), len(observer.conflicts)
-    kept = lost = differing = gaps = 0
+    kept = lost = differing = repeated = 0
     with TransitionStore(run_dir / STORE, "", read_only=True) as store:
         stored = {agent: store.load(agent) for agent in store.agents()}
     on_disk = {agent: {one.n: (one.s, one.a, one.s_next, one.settled, one.duration) for one in made} for agent, made in stored.items()}
     for agent, made in stored.items():
         kept += len(made)
-        gaps += len(made) - len(on_disk[agent])
+        repeated += len(made) - len(on_disk[agent])
     for (agent, n), values in published.items():
         if agent in agents:
             found = on_disk.get(agent, {}).get(n)
             lost += found is None
             differing += found is not None and found != values
-    return Kept(kept, lost, differing + conflicts, gaps)
+    return Kept(kept, lost, differing + conflicts, repeated)
 
 
 class Touch(Struct, frozen=True):
