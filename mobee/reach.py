@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import reprlib
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
@@ -104,6 +105,13 @@ class ReachPlant(Plant, Protocol):
         fault or a restart of the robot.
         """
         ...
+
+
+def checked_target(given: object) -> ReachTarget:
+    """Return the given target unchanged; raises InvalidValue if it is no `ReachTarget`."""
+    if not isinstance(given, ReachTarget):
+        raise InvalidValue(f"target {' '.join(reprlib.repr(given).split())}: must be a ReachTarget, as ReachTarget((-0.3, 0.2, 0.1))")
+    return given
 
 
 def reward_of(missing: float, scale: float = 0.01) -> float:

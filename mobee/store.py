@@ -191,6 +191,11 @@ class TransitionStore(AgentFile):
             self._db.execute(f"INSERT INTO transitions VALUES ({', '.join('?' * len(row))})", row)
         self._last = transition.n
 
+    def after(self, n: int) -> list[Transition]:
+        """Read again which transitions are on disk, because a call of `append` was interrupted; return those after the first `n`."""
+        self._last = self._newest()
+        return self.load()[n:]
+
     def continue_from(self, source: str | Path, settings: dict[str, Any]) -> None:
         """Copy this agent's transitions from the file `source`; do nothing if this file already has settings or transitions of the agent.
 

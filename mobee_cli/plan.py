@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -128,15 +129,15 @@ def _better(learned: Learned, start: int, plan: Plan, discount: float) -> list[s
     pairs = zip(plan.path, plan.actions, strict=False)
     never = sum(learned.model.tries[state, action] == 0 for state, action in pairs)
     beliefs = learned.model.debiased()
-    chances = {
-        goal: Planner(learned.space, beliefs, target_states(learned.space, goal), discount).plan(start).success
-        for goal in range(len(learned.space.samples))
-        if goal not in (start, plan.path[-1])
-    }
+    chances: dict[int, float] = {}
+    for goal in sorted(set(range(len(learned.space.samples))) - {start, plan.path[-1]}):
+        with suppress(MobeeError):  # no path leads there
+            chances[goal] = Planner(learned.space, beliefs, target_states(learned.space, goal), discount).plan(start).success
     best = sorted(chances, key=lambda goal: -chances[goal])[:BETTER]
     tried = f"{never} of its {len(plan.actions)} actions were never tried, so more transitions may find a better one. " if never else ""
     goals = ", ".join(f"{goal} ({chances[goal]:.2f})" for goal in best)
-    return [f"This plan will probably fail: {tried}From here the most reliable goals are {goals}."]
+    reliable = f"From here the most reliable goals are {goals}." if best else "From here no other goal can be reached."
+    return [f"This plan will probably fail: {tried}{reliable}"]
 
 
 def _times(count: int) -> str:

@@ -19,12 +19,12 @@ from mobee.control.reach import Reaches
 from mobee.errors import InvalidValue, UnknownName
 from mobee.model.engine import MAX_HANDS
 from mobee.model.masses import gravity_torque
+from mobee.reach import ReachTarget, checked_target
 from mobee.robot.motor_units import motor_units
 
 if TYPE_CHECKING:
     from mobee.model.model import Model, Reaching
     from mobee.model.pose import Pose
-    from mobee.reach import ReachTarget
 
 FOLLOW_TIME = 0.1  # s of the law's time for which the velocity of a moving goal is valid
 
@@ -234,8 +234,10 @@ class Controller:
         """Pull a marker to a target with the motors of one part, until the next call for this part or `end_reach` (thesis 8.2).
 
         The spring of the attractor and all other forces act at the same time. `part` None: pull with all motors that move the marker.
-        Raises UnknownName for an unknown part or marker, InvalidValue if the marker is moved by none of the motors that may move.
+        Raises UnknownName for an unknown part or marker, InvalidValue if the target is no `ReachTarget`, or if the marker is moved by none
+        of the motors that may move; then nothing changes.
         """
+        checked_target(target)
         if self._reaches.marker(part) != marker:
             self._reaches.begin(part, marker)
         self._reaches[part].aim(target)

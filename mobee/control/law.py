@@ -57,6 +57,7 @@ class Law:
         """Indices of the motors that may be moved."""
         self.live: Ints = np.flatnonzero(mask)
         """Indices of the motors on which forces act."""
+        self._dead: Ints = np.flatnonzero(~mask)
         spans = ([i for i in range(part.start, part.start + len(part)) if mask[i]] for part in robot.parts.values())
         self.parts = np.array([(of_part[0], of_part[-1] + 1) for of_part in spans if of_part], dtype=INTERVAL)
         clauses = [clause for clause in robot.clauses if clause.a[:, mask].any()]
@@ -84,8 +85,9 @@ class Law:
         `Pose.projection` or `Pose.projection_of_part`. `state`: the state of the control law before the step; None: at rest.
         """
         found = np.empty((len(core.term_names()), len(self)))
-        given = numbers(q, len(self)), numbers(torque, len(self)), address(self._still if state is None else state)
-        self._core.forces(self.address, *given, address(found))
+        own = numbers(self._of_live(torque), len(self))
+        self._core.forces(self.address, numbers(q, len(self)), own, address(self._still if state is None else state), address(found))
+        found[:, self._dead] = 0.0  # a clause also has entries of motors that are not alive
         return found
 
     def at_rest(self, q: Array) -> Table:
@@ -100,7 +102,15 @@ class Law:
 
         `f` is the force of a client, that is, of the program that uses the controller (see `Controller.force`).
         """
-        self._core.client(self.address, numbers(f, len(self)), address(total))
+        self._core.client(self.address, numbers(self._of_live(f), len(self)), address(total))
+
+    def _of_live(self, f: Array) -> Array:
+        """Return f (n,) with 0 for motors that are not alive: the forces of a part are bounded together, and these have no share."""
+        if not len(self._dead):
+            return f
+        own = f.copy()
+        own[self._dead] = 0.0
+        return own
 
     def step(self, q: Array, dt: float, attractor: Array, force: Array, state: Table) -> Array:
         """Advance the state by dt [s]; return the commands (3, n): position [rad], velocity [rad/s] and torque [N m].

@@ -272,7 +272,7 @@ class Reflex:
             recovery = self._begin(q, violations)
         _watch(recovery, violations)
         self._advance(recovery, q, violated)
-        return None if self.state == "forward" else self._target
+        return None if self.state == "forward" else self._target.copy()
 
     def give_up(self) -> None:
         """Change to state "stuck"; call this if the robot does not follow the reflex. Without a recovery in progress nothing happens."""

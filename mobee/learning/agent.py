@@ -61,6 +61,7 @@ class CuriousAgent(CuriousLearner):
         self.plant, self.store = plant, store
         self._state: int | None = None
         self._pending: tuple[int, int] | None = None
+        self._is_behind = False  # a write was begun, and what it wrote was not learned
         if continues is not None and store is None:
             raise InvalidValue(f"continues={str(continues)!r} needs a store, to which the transitions are copied: give store=.")
         if store is not None:
@@ -87,6 +88,10 @@ class CuriousAgent(CuriousLearner):
 
     def decide(self, state: int) -> int:
         """Choose the action to take in a state, and return its number; `target`, `act` and `observe` then refer to this action."""
+        if self._is_behind and self.store is not None:
+            for transition in self.store.after(self.transitions):
+                self._learn(transition)
+            self._is_behind = False
         action = self._choose(state)
         self._pending = state, action
         return action
@@ -120,6 +125,7 @@ class CuriousAgent(CuriousLearner):
         action is under way.
         """
         state, action = self._decided()
+        self._state = None  # unknown if this call is interrupted, or the transition cannot be written
         following = self.space.state_after(outcome, state)
         weigh = self.model.observe if self.store is None else self.model.gain
         transition = Transition(
@@ -136,8 +142,10 @@ class CuriousAgent(CuriousLearner):
         if self.store is None:
             self._continue(transition)
         else:
+            self._is_behind = True
             self.store.append(transition)
             self._learn(transition)
+            self._is_behind = False
         self._state, self._pending = following, None
         return transition.reward
 
@@ -161,11 +169,13 @@ class CuriousAgent(CuriousLearner):
         """Perform the action that `decide` chose last, and learn from its outcome; return the reward, the information gain, in nats.
 
         Raises ActionInterrupted if the plant does: then nothing is learned or stored, and the next read of `state` measures the state
-        again. Raises MobeeError if no action was decided.
+        again, also after any other exception and after Ctrl-C. Raises MobeeError if no action was decided.
         """
+        target = self.target(self._decided()[1])
+        self._state = None  # unknown until the outcome is observed
         try:
-            outcome = self.plant.act(self.part, self.target(self._decided()[1]))
-        except ActionInterrupted:
+            outcome = self.plant.act(self.part, target)
+        except BaseException:  # the robot may have moved
             self.interrupt()
             raise
         return self.observe(outcome)
@@ -199,9 +209,19 @@ def run(agents: Sequence[CuriousAgent], transitions: int) -> None:
     """Run agents of different parts at the same time on one plant until they have made `transitions` more transitions in total.
 
     Exactly that many actions are started, so at the end all actions have ended and every transition was observed. Raises InvalidValue
-    unless each agent has its own part and all have the same plant, a `ConcurrentPlant`.
+    unless each agent has its own part and all have the same plant, a `ConcurrentPlant`. After an exception or Ctrl-C the actions under way
+    are not learned, and each agent measures its state.
     """
     plant = _common_plant(agents)
+    try:
+        _run_together(plant, agents, transitions)
+    except BaseException:  # the robot may have moved
+        for agent in agents:
+            agent.interrupt()
+        raise
+
+
+def _run_together(plant: ConcurrentPlant, agents: Sequence[CuriousAgent], transitions: int) -> None:
     waiting, begun, ended = list(agents), 0, 0
     by_part = {agent.part: agent for agent in agents}
     while ended < transitions:

@@ -85,12 +85,17 @@ class Plans:
         self.discount, self.tolerance, self.relative = discount, tolerance, relative
         self._starts: dict[str, Array] = {}
         self._made: dict[str, _Made] = {}
+        self._used: set[str] = set()  # plans that a decision has requested since the last transition
+        self.decides = False
+        """Whether plans are requested for a decision at present."""
 
     def made(self, key: str, reward: Array | None, beliefs: OutcomeModel | None) -> tuple[Array, Array] | None:
         """Return the plan `key` if it was made since the last transition, for the same objects `reward` and `beliefs`; otherwise None.
 
         A plan is the values of states (S,) and of actions (S, A).
         """
+        if self.decides:
+            self._used.add(key)
         made = self._made.get(key)
         return made.plan if made is not None and made.reward is reward and made.beliefs is beliefs else None
 
@@ -114,10 +119,15 @@ class Plans:
         return plan
 
     def keep(self) -> None:
-        """Process the end of a transition: discard the present plans, but keep their values as the start of the next plans."""
-        for key, made in self._made.items():
-            self._starts[key] = made.plan[0]
+        """Process the end of a transition: discard the present plans, but keep their values as the start of the next plans.
+
+        The values of a plan that no decision has requested are discarded too: a restarted learner repeats the decisions only, and must
+        continue from the same values.
+        """
+        for key in self._used & self._made.keys():
+            self._starts[key] = self._made[key].plan[0]
         self._made.clear()
+        self._used.clear()
 
     def undo(self) -> None:
         """Discard the present plans, because the action for which they were made was interrupted.
@@ -125,6 +135,7 @@ class Plans:
         Their values are discarded too: the next plans start from the values that were last kept by `keep`.
         """
         self._made.clear()
+        self._used.clear()
 
 
 class CuriousLearner:
@@ -198,10 +209,18 @@ class CuriousLearner:
 
     def _choose(self, state: int) -> int:
         draws = self._draws.at(self.seed, self.transitions)
-        scores = self._score(self, state, draws)
+        scores = self._scores(state, draws)
         if self.explorer not in EXPLORERS:
             self._require_scores(scores, state)
         return choose(scores, draws)
+
+    def _scores(self, state: int, draws: np.random.Generator) -> Array:
+        """Return the explorer's score of each action of a state; the plans that it requests count as used for a decision."""
+        self._plans.decides = True
+        try:
+            return self._score(self, state, draws)
+        finally:
+            self._plans.decides = False
 
     def _require_scores(self, scores: Array, state: int) -> None:
         """Raise InvalidValue unless an explorer of the user gives a number for each action of the state."""
@@ -230,7 +249,7 @@ class CuriousLearner:
         for transition in transitions:
             if self.transitions in explorers:
                 self._explore_by(explorers[self.transitions])
-            self._score(self, transition.s, self._draws.at(self.seed, self.transitions))
+            self._scores(transition.s, self._draws.at(self.seed, self.transitions))
             self._learn(transition)
         for explorer in list(explorers.values())[-1:]:  # also if it was changed during an action that was never observed
             self._explore_by(explorer)

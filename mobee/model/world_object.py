@@ -105,6 +105,11 @@ class WorldObject:
     mass: float | None = None
     friction: float = FRICTION
 
+    def __post_init__(self) -> None:
+        """Protect the arrays from changes, because all states of the world that contain the object share them."""
+        self.position.setflags(write=False)
+        self.rotation.setflags(write=False)
+
     @property
     def movable(self) -> bool:
         """Whether the object has a mass, so that a physics engine moves it: it can be pushed, lifted and knocked over."""

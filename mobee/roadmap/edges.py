@@ -18,6 +18,7 @@ from mobee.roadmap.ik.costs import lengths
 from mobee.roadmap.ik.problem import solid_model
 
 STEP = 0.001  # m
+TURN = 1.0  # rad; in a larger turn the straight distance between the ends says too little about the path
 SKIN = 0.04  # m: an edge moves a hand by a centimetre, and an elbow by more
 _AT_ONCE = 4096  # poses
 
@@ -91,14 +92,23 @@ def checked(
 def between(model: Model, q: Array, edges: Ints, step: float = STEP, marker: str | None = None) -> Ints:
     """Return how many intermediate poses of each edge must be checked, without its two ends, (E,).
 
-    `q`: (V, n) rad, poses. `edges`: (E, 2) indices in q of the two poses of each edge. The number is the smallest for which the straight
-    distance of the marker between the two ends, divided by (number + 1), is at most `step` [m]. Without a marker, this holds for the centre
-    of every shape.
+    `q`: (V, n) rad, poses. `edges`: (E, 2) indices in q of the two poses of each edge. Each edge is divided into equal pieces in which no
+    motor turns by more than TURN (1 rad), because the straight distance between the ends of a larger turn is much shorter than the path.
+    The number is the smallest for which the longest straight distance of the marker in a piece, times the number of pieces and divided by
+    (number + 1), is at most `step` [m]. Without a marker, this holds for the centre of every shape.
     """
-    far = np.zeros(len(edges))
-    places = points(model, q, marker)
+    far, places = np.zeros(len(edges)), points(model, q, marker)
+    turns = np.abs(q[edges[:, 0]] - q[edges[:, 1]]).max(axis=1, initial=0.0)
+    pieces = np.maximum(np.ceil(turns / TURN), 1.0).astype(np.int64)
     for place in places:
         far = np.maximum(far, np.linalg.norm(place[edges[:, 0]] - place[edges[:, 1]], axis=1))
+    for number in np.unique(pieces[pieces > 1]).tolist():
+        some = np.flatnonzero(pieces == number)
+        start, end = q[edges[some, 0]], q[edges[some, 1]]
+        on = start + np.linspace(0.0, 1.0, number + 1)[:, None, None] * (end - start)
+        for place in points(model, on.reshape(-1, q.shape[1]), marker):
+            lengths = np.linalg.norm(np.diff(place.reshape(number + 1, len(some), 3), axis=0), axis=2)
+            far[some] = np.maximum(far[some], number * lengths.max(axis=0))
     count: Ints = np.maximum(np.ceil(far / step) - 1.0, 0.0).astype(np.int64)
     return count
 

@@ -21,7 +21,7 @@ from mobee.control.gains import VERDICTS
 from mobee.errors import InvalidValue
 from mobee.model.world_object import sphere
 from mobee.plant import Outcome
-from mobee.reach import TARGET, ReachOutcome, ReachTarget
+from mobee.reach import TARGET, ReachOutcome, ReachTarget, checked_target
 from mobee.robot.motor_units import unit_name
 from mobee.robot.robot import Robot
 
@@ -150,8 +150,10 @@ class ReachesUnderWay:
     def present(self, target: ReachTarget | None) -> None:
         """Add the target to the world, or move it if it is in the world already; None removes the target.
 
-        Raises InvalidValue if the target is to be removed while a part is reaching for it.
+        Raises InvalidValue if the target is no `ReachTarget`, or if it is to be removed while a part is reaching for it.
         """
+        if target is not None:
+            checked_target(target)
         pulled = [part for part, reach in self._under_way.items() if reach.end is None]
         if target is None and pulled:
             raise InvalidValue(f"{', '.join(pulled)} is reaching for the target: it can be moved but not removed")

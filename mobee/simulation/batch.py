@@ -18,7 +18,7 @@ import numpy as np
 
 from mobee._core import address
 from mobee._core import plant as core
-from mobee.arrays import Array, Ints, checked_threads
+from mobee.arrays import Array, Ints, checked_threads, real_array
 from mobee.errors import ActionInterrupted, BatchInterrupted, InvalidValue
 from mobee.model.model import Model
 from mobee.plant import Outcome
@@ -45,10 +45,7 @@ def advance_together(plants: Iterable[OfflinePlant], threads: int = 1) -> list[l
         if not plant.acting:
             raise InvalidValue(f"plants[{number}]: no part of it is acting; call its begin, or leave it out")
     found = _finished([plant.advancing() for plant in listed], checked_threads(threads))
-    last_in = {id(plant.model.world): plant for plant in listed}
-    if len(last_in) < len(listed):  # they finished in another order
-        for plant in last_in.values():
-            plant.follow()
+    _follow_last(listed)
     return found
 
 
@@ -67,7 +64,10 @@ def run_together(plants: Iterable[OfflinePlant], ticks: int, threads: int = 1) -
     listed = _apart(plants)
     if isinstance(ticks, bool) or not isinstance(ticks, int) or ticks < 0:
         raise InvalidValue(f"ticks={ticks!r}: give a whole number, 0 or more.")
-    return _finished([plant.running(ticks) for plant in listed], checked_threads(threads))
+    acting = [len(plant.acting) for plant in listed]
+    found = _finished([plant.running(ticks) for plant in listed], checked_threads(threads))
+    _follow_last([plant for plant, before in zip(listed, acting, strict=True) if len(plant.acting) < before])
+    return found
 
 
 def run_batch(work: Callable[[int], T], seeds: Iterable[int], processes: int | None = None) -> list[T]:
@@ -119,9 +119,14 @@ class PlantBatch:
     def aim(self, which: Ints, attractors: Array) -> None:
         """Set the attractors of the plants `which` (k,) to `attractors` (k, n) rad, positions to which the controllers move the motors.
 
-        No action begins, and the limits of the motors are not checked.
+        No action begins, and the limits of the motors are not checked. Raises InvalidValue for another shape, and for numbers that are not
+        finite.
         """
-        self._core.aim_many(self._addresses[which].tobytes(), len(which), np.ascontiguousarray(attractors).tobytes())
+        wanted = real_array("attractors", attractors)
+        shape = len(which), len(self._model.robot.motors)
+        if wanted.shape != shape or not np.isfinite(wanted).all():
+            raise InvalidValue(f"attractors of shape {wanted.shape}: must be {shape} rad, finite.")
+        self._core.aim_many(self._addresses[which].tobytes(), len(which), wanted.tobytes())
 
     def run(self, which: Ints, ticks: int) -> Array:
         """Run exactly `ticks` ticks of each of the plants `which` (k,); return the depths of their deepest contacts.
@@ -179,6 +184,14 @@ def _apart(plants: Iterable[OfflinePlant]) -> list[OfflinePlant]:
                 "give each a Model of its own, with a World of its own."
             )
     return listed
+
+
+def _follow_last(plants: Sequence[OfflinePlant]) -> None:
+    """Let each world that several plants share follow the last of them, as after separate calls: they may have ended in another order."""
+    last_in = {id(plant.model.world): plant for plant in plants}
+    if len(last_in) < len(plants):
+        for plant in last_in.values():
+            plant.follow()
 
 
 def _finished(works: Sequence[Work[T]], threads: int) -> list[T]:

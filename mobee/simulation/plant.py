@@ -132,6 +132,7 @@ class OfflinePlant:
         self._hashed = chosen.hashed
         self._digest = hashlib.sha256() if chosen.hashed else None
         self._reaches = ReachesUnderWay(model, self._controller)
+        self._acting = 0  # number of acting parts when the ticks began
         self._period = 0  # ticks
         self._callback: Callable[[float], None] | None = None
 
@@ -151,6 +152,8 @@ class OfflinePlant:
         start = self._checked_start(q)
         self.motors.restart(seed, start)
         self._reaches.restart()
+        for part in (None, *self.robot.parts):
+            self._controller.end_reach(part)
         self._actions.end_all()
         self._controller.clear()
         self._controller.reset(start)
@@ -299,7 +302,7 @@ class OfflinePlant:
     def follow(self) -> None:
         """Pass the pose of the last tick to the world, which needs it to attach and detach objects.
 
-        It is called at the end of every action.
+        It is called at the end of every action, but not in a run of a `PlantBatch`, whose plants share one world.
         """
         self.model.world.follow(self.model.evaluate(self.q))
 
@@ -388,6 +391,7 @@ class OfflinePlant:
         """
         if self._callback is not None:
             most = min(most, self._period - self._runner.ticks % self._period)
+        self._acting = len(self._actions.under_way)
         address = self._runner.prepare(most, traced or self._digest is not None, traced, self.reaching)
         try:
             yield address
@@ -412,6 +416,8 @@ class OfflinePlant:
             for part in self._reaches.running:
                 self._reaches.drop(part)
             raise ActionInterrupted(f"the motors' state is not finite at {self.time:.3f} s: nothing was observed")
+        if self._acting > len(self._actions.under_way):
+            self.follow()
         if self._reaches.running:
             self._let_go()
         if self._callback is not None and self._runner.ticks % self._period == 0:
@@ -437,7 +443,6 @@ class OfflinePlant:
             raise InvalidValue(f"{doing}({part!r}) while {', '.join(others)} is acting: use begin and advance for several parts")
 
     def _outcome(self, part: str) -> Outcome:
-        self.follow()
         return self._actions.outcome(part, self._runner.q, self.time - self.dt, self._touched(part))
 
     def _touched(self, part: str) -> tuple[str, ...]:

@@ -38,15 +38,16 @@ class SlidingObject:
     have no friction. Such an object moves in the horizontal direction of a contact's normal until the contact is resolved, and does not
     rotate. It topples if it is pushed higher than radius / friction above the surface, pressed from above, or wedged between solids; it
     falls if its centre leaves the area. A fallen object is removed from the world for one second, and is then put back to its first place
-    as soon as no solid of the robot is in this place, or within 3 cm of its side. It exerts no force on the robot, and other
-    objects do not stop it.
+    as soon as no solid of the robot is in this place, or within 3 cm of its side; after a restart of the plant, without the wait. It exerts
+    no force on the robot, and other objects do not stop it. `World.move` moves it to another place.
 
     Args:
         plant: the plant whose motion pushes the object; its callback (`every`) is used for this.
         name: name of an upright cylinder in the plant's world with the role "ghost", so that the controller keeps no distance from it.
         support: name of the box on which it stands.
         friction: coefficient of friction between object and support.
-        area: ((x low, x high), (y low, y high)) in m, root frame; the object falls when its centre leaves it; None: the top of the support.
+        area: ((x low, x high), (y low, y high)) in m, root frame; the object falls when its centre leaves it; None: the top of the support,
+            which may be turned about the vertical.
 
     Raises:
         UnknownName: the world has no such object.
@@ -65,10 +66,11 @@ class SlidingObject:
         thing, under = objects[name], objects[support]
         self._surface = _surface(thing, under)
         self.name, self.friction = name, float(friction)
-        self.area: Area = _top(under) if area is None else area
+        self._area = _top(under) if area is None else _bounds(area)
         if not self._is_inside(thing.position):
+            where = f"the top of {support}" if area is None else f"the area {area}"
             raise InvalidValue(
-                f"{name} stands at x, y = {thing.position[:2].tolist()} m, outside the area {self.area}: move it, or give a larger area."
+                f"{name} stands at x, y = {thing.position[:2].tolist()} m, outside of {where}: move it, or give a larger area."
             )
         self._plant, self._engine, self._first = plant, engine_of(_solids(plant.robot)), thing
         self._alone, self._room = _world(thing, 0.0), _world(thing, CLEARANCE)
@@ -119,9 +121,16 @@ class SlidingObject:
         """
         q = self._plant.motors.q.tobytes()
         if self._place is None:
-            if time - self._fell_at >= ABSENCE:
+            if not 0.0 <= time - self._fell_at < ABSENCE:  # below 0 after a restart of the plant
                 self.put_back()
             return
+        thing = self._plant.model.world.objects.get(self.name)
+        if thing is None:
+            return  # the caller has removed it
+        there = thing.position
+        if (there != self._place).any():  # the caller has moved it
+            self._place = there.copy()
+            self._alone.move(self.name, position=there)
         found = self._deepest(q, self._alone)
         if found is not None:
             after = self._pushed(q, self._place.copy(), found)
@@ -162,7 +171,8 @@ class SlidingObject:
         return deepest if deepest[0] > TOLERANCE else None
 
     def _is_inside(self, place: Array) -> bool:
-        return all(low <= at <= high for at, (low, high) in zip(place.tolist(), self.area, strict=False))
+        centre, half, turn = self._area
+        return bool((np.abs(turn.T @ (place[:2] - centre)) <= half).all())
 
     def _fall(self, time: float) -> None:
         self.falls += 1
@@ -184,11 +194,15 @@ def _surface(thing: WorldObject, under: WorldObject) -> float:
     return float(top)
 
 
-def _top(under: WorldObject) -> Area:
-    """Return the bounds of the top of a box, which may be turned about the vertical; m."""
-    half = np.abs(under.rotation[:2, :2]) @ (0.5 * np.array(under.size[:2]))
-    (x, y), (dx, dy) = under.position[:2].tolist(), half.tolist()
-    return (x - dx, x + dx), (y - dy, y + dy)
+def _top(under: WorldObject) -> tuple[Array, Array, Array]:
+    """Return the top of an upright box, in the plane x, y: centre (2,) m, half of its edges (2,) m, and rotation (2, 2)."""
+    return under.position[:2], 0.5 * np.array(under.size[:2]), under.rotation[:2, :2]
+
+
+def _bounds(area: Area) -> tuple[Array, Array, Array]:
+    """Return an area with edges along the axes as `_top` does."""
+    low, high = np.array(area).T
+    return 0.5 * (low + high), 0.5 * (high - low), np.eye(2)
 
 
 def _world(thing: WorldObject, wider: float) -> World:

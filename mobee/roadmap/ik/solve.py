@@ -114,6 +114,7 @@ def _evolved(problem: Problem, rng: np.random.Generator, most: int) -> Array:
         return problem.start
     low, high = problem.limits.T
     search = Search(start, STD * (high - low), problem.limits, Restart(), POPULATION, seed=rng)
+    search.best, search.best_cost = start.copy(), float(costs[0])
     while problem.evaluations + POPULATION <= most and (problem.must or search.starts == 1):
         q = problem.whole(search.ask())
         costs, good = problem.evaluate(q)

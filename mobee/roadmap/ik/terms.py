@@ -138,7 +138,8 @@ class Function:
 
     The function returns N numbers for a batch, or one number for one pose. Its first argument is the batch or pose. For a batch, its second
     argument is the table of all contacts; for one pose, a tuple of the contacts. The first call tests whether the function accepts a batch,
-    that is, returns the same values for it as for the single poses. `contacts`: False if the function takes only the pose.
+    that is, returns the same values for it as for the single poses, or fails for single poses and returns N numbers for it. `contacts`:
+    False if the function takes only the pose.
     """
 
     def __init__(self, function: Plain, contacts: bool = True) -> None:
@@ -149,7 +150,14 @@ class Function:
     def __call__(self, pose: Pose) -> Array:
         """Return the values (N,) of the function in the N poses of the batch `pose`."""
         if self._takes_batches is None:
-            singly = self._singly(pose)
+            try:
+                singly = self._singly(pose)
+            except Exception:  # of any kind: the function may have been written for a batch only
+                together = self._called(pose, single=False)
+                if together.shape != (len(pose.q),):
+                    raise
+                self._takes_batches = True
+                return together
             self._takes_batches = self._agrees(pose, singly)
             return singly
         if not self._takes_batches:

@@ -167,8 +167,31 @@ def test_a_resumed_agent_does_what_an_uninterrupted_one_does(tmp_path, options):
     assert again.store.load() == whole.store.load()
     assert np.array_equal(again.model.probabilities, whole.model.probabilities)
     assert np.array_equal(again.model.tries, whole.model.tries)
-    if options.get("explorer", "curious") == "curious":  # who plans only for those who look starts elsewhere
-        assert np.array_equal(again.plan()[1], whole.plan()[1])
+    assert np.array_equal(again.plan()[1], whole.plan()[1])
+
+
+def test_plans_that_only_an_observer_requests_do_not_change_later_decisions(tmp_path):
+    def make(name, plant):
+        return CuriousAgent(arm(), plant, seed=3, explorer="random", store=TransitionStore(tmp_path / name, "left_arm"))
+
+    def observed(agent, transitions):
+        for _ in range(transitions):
+            agent.plan()
+            agent.step()
+
+    whole = make("whole.sqlite", FickleDice(toy_robot(), seed=9))
+    observed(whole, 60)
+    whole.explore_by("curious")
+    observed(whole, 40)
+
+    first = make("parts.sqlite", FickleDice(toy_robot(), seed=9))
+    observed(first, 60)
+    first.explore_by("curious")
+    first.store.close()
+    again = make("parts.sqlite", FickleDice(toy_robot(), seed=9, actions=60, start={"left_arm": np.array(first.last.q)}))
+    again.run(40)
+    assert np.array_equal(again.plan()[1], whole.plan()[1])
+    assert again.store.load() == whole.store.load()
 
 
 def test_an_agent_whose_explorer_was_changed_goes_on_as_if_it_had_never_stopped(tmp_path):
@@ -302,6 +325,70 @@ def test_an_interrupted_action_is_not_observed_and_the_agent_measures_again(tmp_
     assert agent.state == 0 != agent.last.s_next
     agent.step()
     assert agent.last.s == 0 and agent.transitions == 2
+
+
+class LostAfterMoving(InstantPlant):
+    """Moves, and is interrupted before it returns an outcome, at its third action."""
+
+    def __init__(self, robot):
+        super().__init__(robot)
+        self.actions = 0
+
+    def act(self, part, target):
+        self.actions += 1
+        outcome = super().act(part, target)
+        if self.actions == 3:
+            raise KeyboardInterrupt
+        return outcome
+
+
+def test_after_ctrl_c_the_agent_measures_its_state():
+    agent = CuriousAgent(torso(), LostAfterMoving(toy_robot()))
+    with pytest.raises(KeyboardInterrupt):
+        agent.run(5)
+    assert agent.transitions == 2
+    assert agent.state == agent.space.state_of(agent.plant.measure("torso")) != agent.last.s_next
+    agent.run(1)
+    assert agent.last.s_next == agent.space.goal(agent.last.s, agent.last.a)
+
+
+def test_after_ctrl_c_agents_that_run_together_measure_their_states():
+    plant = ToyConcurrent(toy_robot(), {"torso": 1.0})
+    agent = CuriousAgent(torso(), plant)
+    run([agent], 3)
+    advance = plant.advance
+
+    def interrupted():
+        advance()
+        raise KeyboardInterrupt
+
+    plant.advance = interrupted
+    with pytest.raises(KeyboardInterrupt):
+        run([agent], 1)
+    assert agent.transitions == 3 and agent.state == agent.space.state_of(plant.measure("torso"))
+
+
+@pytest.mark.parametrize("written", [True, False])
+def test_an_interrupted_write_is_learnt_if_it_is_on_disk(tmp_path, written, monkeypatch):
+    agent = CuriousAgent(torso(), InstantPlant(toy_robot()), store=TransitionStore(tmp_path / "run.sqlite", "torso"))
+    agent.run(3)
+    append = agent.store.append
+
+    def interrupted(transition):
+        if written:
+            append(transition)
+            agent.store._last -= 1  # as if the interrupt had come within the call
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(agent.store, "append", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        agent.run(1)
+    monkeypatch.undo()
+    assert agent.state == agent.space.state_of(agent.plant.measure("torso"))
+    agent.run(2)
+    stored = agent.store.load()
+    assert len(stored) == agent.transitions == agent.model.tries.sum() == 5
+    assert all(before.s_next == after.s for before, after in zip(stored[3:], stored[4:], strict=False))
 
 
 def test_a_run_continues_after_interruptions():

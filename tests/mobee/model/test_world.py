@@ -43,6 +43,13 @@ def test_the_callers_array_is_not_kept(world):
     assert np.array_equal(world.objects["cup"].position, [1.0, 2.0, 3.0])
 
 
+def test_the_arrays_of_an_object_cannot_be_changed(world):
+    name = next(iter(world.objects))
+    for values in (world.objects[name].position, world.objects[name].rotation):
+        with pytest.raises(ValueError, match="read-only"):
+            values[0] = 1.0
+
+
 def test_move_keeps_the_position_or_rotation_that_is_not_given(world):
     world.move("cup", rotation=HALF_TURN)
     assert np.array_equal(world.objects["cup"].position, [0.1, 0.2, 0.3])

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -34,7 +36,10 @@ def test_an_edge_is_free_where_no_pose_along_it_touches(model: mobee.Model, pose
     found = checked(model, poses, EDGES, STEP, "right_palm")
     wanted = []
     for a, b in EDGES:
-        count = int(np.ceil(np.linalg.norm(np.diff(points(model, poses[[a, b]], "right_palm")[0], axis=0)) / STEP))
+        pieces = max(int(np.ceil(np.abs(poses[b] - poses[a]).max())), 1)  # of at most 1 rad
+        ends = poses[a] + (poses[b] - poses[a]) * np.linspace(0.0, 1.0, pieces + 1)[:, None]
+        chords = np.linalg.norm(np.diff(points(model, ends, "right_palm")[0], axis=0), axis=1)
+        count = int(np.ceil(pieces * chords.max() / STEP))
         share = np.arange(count + 1)[:, None] / count
         wanted.append(not np.any(model.evaluate(poses[a] + (poses[b] - poses[a]) * share).count))
     np.testing.assert_array_equal(found.free, wanted)
@@ -97,3 +102,33 @@ def test_any_number_of_threads_finds_the_same(model: mobee.Model, poses: np.ndar
 def test_invalid_numbers_of_threads_are_refused(model: mobee.Model, poses: np.ndarray, threads: object) -> None:
     with pytest.raises(InvalidValue, match="whole number from 1"):
         check_edges(model, poses, EDGES, STEP, threads=threads)
+
+
+def test_an_edge_with_a_large_turn_is_checked_along_its_arc(model: mobee.Model) -> None:
+    robot = model.robot
+    ends = np.repeat(robot.home[None], 2, axis=0)
+    yaw = robot.motor_index("torso_yaw")
+    low, high = robot.limits[yaw]
+    ends[:, yaw] = low, high
+    count = int(between(model, ends, np.array([[0, 1]]), STEP, "right_palm")[0])
+    q = ends[0] + np.linspace(0.0, 1.0, count + 2)[:, None] * (ends[1] - ends[0])
+    assert high - low > 1.5
+    assert (
+        np.linalg.norm(np.diff(points(model, q, "right_palm")[0], axis=0), axis=1).max() < 1.05 * STEP
+    )  # a chord of 1 rad is 4 % shorter than its arc
+
+
+def test_an_obstacle_is_found_in_a_whole_turn() -> None:
+    robot = mobee.load_robot("icub")
+    yaw = robot.motor_index("torso_yaw")
+    motors = tuple(
+        replace(motor, limits=np.array([-np.pi, np.pi])) if number == yaw else motor for number, motor in enumerate(robot.motor_table)
+    )
+    turning, world = replace(robot, motor_table=motors), mobee.World()
+    ends = np.repeat(robot.home[None], 2, axis=0)
+    ends[:, yaw] = -3.141, 3.141  # nearly the same place
+    middle = ends[0] + 0.37 * (ends[1] - ends[0])
+    world.add("post", mobee.sphere(0.01), position=mobee.Model(turning).evaluate(middle).position("right_palm"))
+    model = mobee.Model(replace(turning, solid_pairs=turning.solid_pairs[:0]), world)  # without self-contacts
+    assert not np.any(model.evaluate(ends).table.kind == 0)
+    assert not check_edges(model, ends, np.array([[0, 1]]), 0.001, "right_palm")[0]

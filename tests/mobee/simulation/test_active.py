@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from mobee import sphere
+from mobee.control import Gains
 from mobee.errors import InvalidValue, UnknownName
 from mobee.model.model import Model
 from mobee.model.world_file import load_world
@@ -103,3 +104,24 @@ def test_plants_of_one_robot_share_the_reduced_robot() -> None:
     del one
     gc.collect()
     assert gone() is None, "nobody keeps it"
+
+
+@pytest.mark.parametrize("published", [False, True])
+def test_a_controller_gives_motors_between_active_ones_no_share_of_the_forces(published: bool) -> None:
+    robot, names = load_robot("icub"), ["l_shoulder_pitch", "l_shoulder_yaw", "l_elbow"]
+    active = [robot.motor_index(name) for name in names]
+    gains = Gains.published_2014() if published else None
+    plant = OfflinePlant(Model(robot, load_world("table")), gains=gains, active=names, motors=MotorParameters.ideal())
+    rng, touched = np.random.default_rng(1), 0
+    low, high = robot.limits[active].T
+    for _ in range(40):
+        q = robot.home.copy()
+        q[active] = low + rng.random(3) * (high - low)
+        plant.restart(0, q)
+        plant.tick()
+        found = plant.controller.forces(plant.model.evaluate(q))
+        total = found.limits + found.constraints + found.collision
+        np.testing.assert_allclose(found.collision[active], plant.controller.last_forces.collision[active], rtol=1e-9, atol=1e-12)
+        assert not total[np.setdiff1d(np.arange(len(q)), active)].any()
+        touched += found.collision.any()
+    assert touched > 5

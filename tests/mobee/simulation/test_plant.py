@@ -9,7 +9,9 @@ import pytest
 
 from mobee.arrays import Array
 from mobee.control import Gains, Settle
+from mobee.control.reach import Reacher
 from mobee.errors import ActionInterrupted, InvalidValue, UnknownName
+from mobee.model import sphere
 from mobee.model.model import Model
 from mobee.model.world_file import load_world
 from mobee.robot.load import load_robot
@@ -190,3 +192,43 @@ def test_q_holds_the_encoders_of_all_parts() -> None:
     assert np.array_equal(plant.q, np.concatenate([plant.measure(part) for part in plant.robot.parts]))
     plant.q[:] = 0.0
     assert plant.q.any()
+
+
+def test_after_run_and_tick_objects_are_attached_where_they_are() -> None:
+    for finish in (lambda plant: plant.run(600), lambda plant: [plant.tick() for _ in range(600)]):
+        world = load_world("table")
+        world.add("cup", sphere(0.03), position=(-0.4, -0.3, 0.2), role="ghost")
+        robot = load_robot("icub")
+        plant = OfflinePlant(Model(robot, world), motors=MotorParameters.ideal(), active=["left_arm"])
+        goal = plant.measure("left_arm")
+        goal[3] += 0.3
+        plant.act("left_arm", goal)
+        goal[3] += 0.5
+        plant.begin("left_arm", goal)
+        finish(plant)
+        assert plant.acting == ()
+        world.attach("cup", robot.links[robot.marker("left_palm").link])
+        now = plant.model.evaluate(plant.q).objects["cup"].position
+        np.testing.assert_allclose(now, (-0.4, -0.3, 0.2), atol=0.02)  # the arm settles further after the end of its action
+
+
+def test_a_restart_ends_the_reaches_of_the_controller() -> None:
+    model = Model(load_robot("icub"))
+    plant = OfflinePlant(model, seed=1)
+    Reacher(plant.controller, "right_palm", np.array([-0.3, 0.2, 0.1]))
+    plant.run(50)
+    plant.restart(1)
+    np.testing.assert_array_equal(plant.run(50).q, OfflinePlant(model, seed=1).run(50).q)
+
+
+@pytest.mark.parametrize("target", [(-0.3, 0.2, 0.1), np.array([-0.3, 0.2, 0.1]), "ball"])
+def test_what_is_no_reach_target_is_refused_and_pulls_nothing(target: Any) -> None:
+    plant = OfflinePlant(Model(load_robot("icub")), motors=MotorParameters.ideal())
+    with pytest.raises(InvalidValue, match="must be a ReachTarget"):
+        plant.present(target)
+    with pytest.raises(InvalidValue, match="no target is presented"):
+        plant.reach("right_arm", "right_palm")
+    with pytest.raises(InvalidValue, match="must be a ReachTarget"):
+        plant.controller.reach_toward("right_arm", "right_palm", target)
+    same = OfflinePlant(Model(load_robot("icub")), motors=MotorParameters.ideal())
+    np.testing.assert_array_equal(plant.run(50).q, same.run(50).q)

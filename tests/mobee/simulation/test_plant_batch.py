@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mobee import BatchInterrupted, OfflinePlant, PlantSettings, load_robot, load_world
-from mobee.errors import ActionInterrupted
+from mobee.errors import ActionInterrupted, InvalidValue
 from mobee.model.model import Model
 from mobee.simulation import PlantBatch
 
@@ -95,3 +95,15 @@ def test_no_ticks_have_no_depths(forced: bool) -> None:
     if forced:
         batch.plants[1].each_tick = lambda plant: None
     assert batch.run(np.arange(2), 0).tolist() == [[0.0, 0.0], [0.0, 0.0]]
+
+
+def test_attractors_of_other_types_are_converted_and_of_other_shapes_refused() -> None:
+    robot = load_robot("icub")
+    batch, n = PlantBatch(Model(robot), 2, PlantSettings(active=["left_arm"])), len(robot.motors)
+    for values in (np.ones((1, n), np.float32), np.ones((1, n), int), np.ones((1, n)).tolist()):
+        batch.aim(np.array([0]), np.zeros((1, n)))
+        batch.aim(np.array([0]), values)  # type: ignore[arg-type]  # a list is converted, too
+        np.testing.assert_array_equal(batch.state()[0, 1], np.ones(n))
+    for wrong in (np.ones((1, n)), np.ones((2, n - 1)), np.full((2, n), np.nan)):
+        with pytest.raises(InvalidValue, match="attractors of shape"):
+            batch.aim(np.array([0, 1]), wrong)

@@ -119,7 +119,7 @@ def test_it_is_put_back_on_request_unless_the_robot_is_near() -> None:
         ({"name": "mug"}, "mug"),
         ({"support": "cup"}, "no upright box"),
         ({"friction": 0.0}, "above 0"),
-        ({"area": ((0.0, 0.5), (-1.0, 1.0))}, "outside the area"),
+        ({"area": ((0.0, 0.5), (-1.0, 1.0))}, "outside of the area"),
     ],
 )
 def test_arguments_that_do_not_fit_are_refused(change: dict[str, Any], message: str) -> None:
@@ -135,3 +135,36 @@ def test_it_must_be_a_ghost_that_stands_on_its_support() -> None:
     plant.model.world.move("cup", position=(*BESIDE, 0.1))
     with pytest.raises(InvalidValue, match="above table"):
         SlidingObject(plant, "cup")
+
+
+def test_after_a_restart_of_the_plant_it_is_put_back_at_once() -> None:
+    plant, cup = stage(area=((0.2, 1.1), (-0.25, 0.8)))
+    plant.run(300)
+    plant.act("trunk", np.array([-0.3]))
+    plant.act("trunk", np.array([0.3]))
+    plant.act("trunk", np.array([-0.3]))
+    assert cup.place is None and plant.time > 3.0
+    plant.restart(0, np.array([0.3, *plant.robot.home[1:]]))
+    plant.run(2 * round(PERIOD / plant.dt))
+    assert cup.place is not None and cup.place[:2].tolist() == list(BESIDE)
+
+
+def test_it_stays_where_the_caller_moves_it() -> None:
+    plant, cup = stage()
+    plant.model.world.move("cup", position=(0.75, -0.5, TOP + HEIGHT / 2))
+    plant.run(10)
+    assert cup.place is not None and cup.place[1] == -0.5
+    plant.model.world.remove("cup")
+    plant.act("trunk", np.array([-0.3]))  # there is nothing to push
+    assert "cup" not in plant.model.world.objects
+
+
+def test_the_top_of_a_turned_support_is_turned() -> None:
+    plant, _ = stage()
+    half = np.sqrt(0.5)
+    plant.model.world.move("table", rotation=np.array([[half, -half, 0.0], [half, half, 0.0], [0.0, 0.0, 1.0]]))
+    plant.model.world.move("cup", position=(1.1, 1.1, TOP + HEIGHT / 2))  # within the bounds of the turned table, beyond its edge
+    with pytest.raises(InvalidValue, match="outside of the top of table"):
+        SlidingObject(plant, "cup")
+    plant.model.world.move("cup", position=(1.6, 0.0, TOP + HEIGHT / 2))  # near its corner
+    assert SlidingObject(plant, "cup").place is not None

@@ -160,3 +160,15 @@ def test_terms_with_equal_names_get_numbers(free: mobee.Model) -> None:
 def test_invalid_arguments_are_refused(free: mobee.Model, arguments: dict, error: type) -> None:
     with pytest.raises(error):
         mobee.solve_ik(free, **({"costs": [costs.home()]} | arguments))
+
+
+@pytest.mark.parametrize("method", ["nes", "hybrid"])
+def test_the_result_is_never_worse_than_the_start(free: mobee.Model, method: str) -> None:
+    home = free.robot.home
+    near = free.evaluate(home).position("right_palm") + [0.0, 0.006, 0.0]
+    goals = [costs.home()], [costs.position("right_palm", near, tolerance=0.002), costs.home()]
+    for goal in goals:
+        ik = mobee.solve_ik(free, goal, seed=1, method=method, evaluations=200)
+        cost = [sum(one.residual(free.evaluate(q[None]))[0] for one in goal) for q in (home, ik.q)]
+        assert ik.reached or cost[1] <= cost[0]
+    assert np.array_equal(mobee.solve_ik(free, [costs.home()], method="nes").q, home)

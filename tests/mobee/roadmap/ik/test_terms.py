@@ -21,6 +21,17 @@ def test_a_function_for_one_pose_and_one_for_a_batch_say_the_same(free: mobee.Mo
         np.testing.assert_allclose(batched.residual(pose), expected)
 
 
+def test_a_function_may_be_written_for_a_batch_only(free: mobee.Model, postures: np.ndarray) -> None:
+    pose = free.evaluate(postures)
+    counted = costs.term(lambda pose, contacts: np.bincount(contacts.pose, minlength=len(pose.q)))
+    high = costs.term(lambda pose, contacts: np.abs(pose.position("left_palm")[:, 2]))
+    for _ in range(2):
+        np.testing.assert_array_equal(counted.residual(pose), [len(one.contacts) for one in pose.each()])
+        np.testing.assert_array_equal(high.residual(pose), np.abs(pose.position("left_palm")[:, 2]))
+    with pytest.raises(ZeroDivisionError):
+        costs.term(lambda pose, contacts: 1 / 0).residual(pose)
+
+
 def test_a_batched_function_is_called_once_a_batch(free: mobee.Model, postures: np.ndarray) -> None:
     calls = []
 
