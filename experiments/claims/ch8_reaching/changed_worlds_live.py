@@ -69,7 +69,7 @@ from experiments.claims.ch8_reaching.live_reach.problems import (
 from experiments.kit.control.plant_runs import place
 from experiments.kit.experiment import MIN_SEEDS, Experiment, Measured, judged
 from experiments.kit.learning.arm import RIGHT
-from experiments.kit.live.launch import TABLE, add_backend, append_done, launch, read_done, read_job, write_job
+from experiments.kit.live.launch import TABLE, LaunchFailed, add_backend, append_done, launch, read_done, read_job, write_job
 from experiments.kit.plots import finish, new_figure, ticks_at
 from experiments.kit.reaching.arm import MARKER, PART, JudgedPlant, SeenHand
 from experiments.kit.reaching.truth import Truth, failed_transitions, load_truth, oracle, remaining_errors
@@ -322,7 +322,7 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def _launched(folder: Path, job: Job, backend: str) -> list[Score]:
-    """Launch the live system for one job, and return the scores that it wrote."""
+    """Launch the live system for one job, and return the scores that it wrote; raises LaunchFailed if the job did not write all of them."""
     write_job(folder, job)
     world = world_file(job.change, folder)
     simulator: dict[str, Any] = {"backend": backend, "truth_rate": RATE}
@@ -332,7 +332,10 @@ def _launched(folder: Path, job: Job, backend: str) -> list[Score]:
         folder, PERFORM, title=f"Changed worlds with {backend}: {job.kind} {job.change}", world=str(world), seed=job.seed, rate=RATE,
         speed=1.0, seconds=MAX_SECONDS, simulator=simulator,
     )  # fmt: skip
-    return read_done(folder, Score)
+    scores = read_done(folder, Score)
+    if len(scores) < (wanted := {"before": 0, "after": len(REPETITIONS), "oracle": 1}[job.kind]):
+        raise LaunchFailed(f"{folder.name}: the system ended after {len(scores)} of {wanted} evaluations.")
+    return scores
 
 
 Runs = Mapping[str, list[dict[str, Any]]]  # by change

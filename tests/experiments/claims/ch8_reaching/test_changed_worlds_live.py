@@ -5,11 +5,15 @@ from argparse import Namespace
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
+from experiments.claims.ch8_reaching import changed_worlds_live
 from experiments.claims.ch8_reaching.changed_worlds_live import (
     CHANGES,
     CLAIMS,
     EXPERIMENT,
+    Job,
+    Score,
     changed_world,
     conditions,
     findings,
@@ -18,6 +22,7 @@ from experiments.claims.ch8_reaching.changed_worlds_live import (
     world_file,
 )
 from experiments.kit.cells import Cell
+from experiments.kit.live.launch import LaunchFailed, append_done
 from mobee import load_world
 from tests.experiments.finished_cells import finished
 
@@ -73,3 +78,11 @@ def test_the_figure_has_a_column_of_panels_for_each_change(tmp_path):
     drawing = EXPERIMENT.method.plot(cells(9.8, 1.0))
     assert [axes.get_title() for axes in drawing.axes[: len(CHANGES)]] == list(CHANGES.values())
     drawing.savefig(tmp_path / "live.png")
+
+
+def test_a_system_that_ended_before_all_evaluations_is_named(tmp_path, monkeypatch):
+    monkeypatch.setattr(changed_worlds_live, "launch", lambda folder, *_, **__: append_done(folder, Score(1.0, 0.0, 0.0, 0)))
+    job = Job("after", 0, "store.sqlite", "ball", 60, 1000)
+    with pytest.raises(LaunchFailed, match="ball: the system ended after 1 of 2 evaluations"):
+        changed_worlds_live._launched(tmp_path / "ball", job, "pybullet")
+    assert len(changed_worlds_live._launched(tmp_path / "ball", replace(job, kind="oracle"), "pybullet")) == 1
