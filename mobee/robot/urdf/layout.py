@@ -13,7 +13,7 @@ from mobee.arrays import Array
 from mobee.robot.bodies import from_six, one_a_link
 from mobee.robot.robot import Body, Joint, Marker
 from mobee.robot.urdf.motors import stated_limits
-from mobee.robot.urdf.tree import IDENTITY, Frame, Tree, UrdfJoint, bounded, child, read_origin, triple
+from mobee.robot.urdf.tree import IDENTITY, Frame, Tree, UrdfJoint, bounded, check_spelling, child, read_origin, triple
 from mobee.robot.xml.node import SMALLEST, Node
 from mobee.robot.xml.volume import Z, turn_about
 
@@ -136,5 +136,6 @@ def _inertia(inertial: Node, place: Frame) -> Array | None:
     node, note = child(inertial, "inertia"), child(inertial, "mobee")
     if node is None or (note is not None and note.flag("assumed")):
         return None
+    check_spelling(node, SIX)
     inertia = place.rotation @ from_six([bounded(node, name, 0.0) for name in SIX]) @ place.rotation.T
     return inertia if inertia.any() else None

@@ -140,7 +140,7 @@ def read_motor(master: UrdfJoint, driven: Sequence[tuple[int, UrdfJoint, Drive]]
     `driven`: for each of these joints, `master` included, (index in the robot, joint, drive). `part`: name of the motor's part. The unit is
     that of `master`: rad, or m if it is prismatic. At home, `master` is at 0, or as near to it as possible outside the motor's limit zones.
     A limit zone is a range near a limit, in which the control law pushes inward. A <mobee> element of `master` (from `write_urdf`) can give
-    name, acceleration, scale and offset of the motor. Warns of limits that are assumed or ignored.
+    name, acceleration, scale and offset of the motor. Warns of limits that are assumed or ignored, and of a velocity or effort below 0.
     """
     limits = joint_limits(master)
     _warn_of_free(master)
@@ -165,9 +165,17 @@ def _limited(master: UrdfJoint, motor: Motor) -> Motor:
     if limit is None:
         return motor
     velocity, effort = _or_infinite(limit, "velocity"), limit.number("effort", 0.0)
+    slides = master.kind == "prismatic"
+    _warn_if_negative(limit, "velocity", velocity, f"{motor.max_velocity:.4g} {'m/s' if slides else 'rad/s'}")
+    _warn_if_negative(limit, "effort", effort, f"{motor.max_torque:.4g} {'N' if slides else 'N m'}")
     if 0 < velocity < inf:  # exporters write 0 for an unknown value
         motor = replace(motor, max_velocity=velocity)
     return replace(motor, max_torque=effort) if effort > 0 else motor
+
+
+def _warn_if_negative(limit: Node, name: str, value: float, default: str) -> None:
+    if value < 0:
+        limit.warn(f"{name} is {value:g}, which is below 0, so the default {default} is taken. Write a number above 0")
 
 
 def _extended(master: UrdfJoint, motor: Motor) -> Motor:

@@ -19,11 +19,12 @@ from mobee.robot.robot import Channels, MeshSource, Shape, Visual, VisualKind
 from mobee.robot.urdf.hull import Corners, convex_hull, smallest, smallest_capsule
 from mobee.robot.urdf.layout import Skeleton
 from mobee.robot.urdf.mesh import find_mesh, read_mesh
-from mobee.robot.urdf.tree import Frame, Tree, child, read_origin, triple
+from mobee.robot.urdf.tree import Frame, Tree, check_spelling, child, read_origin, triple
 from mobee.robot.xml.body import MOST_SHAPES
 from mobee.robot.xml.node import SMALLEST, Node, descendants, nearest
 
 Meshes = Literal["hull", "bounding"]
+MESH_ATTRIBUTES = ("filename", "scale")
 GEOMETRIES = ("sphere", "cylinder", "capsule", "box", "mesh")
 LINK_TAGS = ("inertial", "visual", "collision", "contact", "mobee")
 LARGEST = 1e4  # m
@@ -111,6 +112,7 @@ class ShapeReader:
         return self._mesh(form, shape)
 
     def _mesh(self, form: Node, shape: Shape) -> Shape:
+        check_spelling(form, MESH_ATTRIBUTES)
         scale = triple(form, "scale") if "scale" in form.attributes else np.ones(3)
         if np.abs(scale).min() < SMALLEST:
             form.fail("scale", "has a factor of 0", "Write three factors such as 0.001 0.001 0.001")
@@ -250,6 +252,7 @@ def _read(node: Node, link: int, frame: Frame, materials: Mapping[str, Node]) ->
                 x, y, z = np.maximum(np.abs(triple(form, "size")), SMALLEST).tolist()
                 kind, size = "box", (x, y, z)
             case "mesh":
+                check_spelling(form, MESH_ATTRIBUTES)
                 x, y, z = (triple(form, "scale") if "scale" in form.attributes else np.ones(3)).tolist()
                 kind, size = "mesh", ()
                 mesh = MeshSource(form.text("filename"), Path(form.file), form.line, scale=(x, y, z))

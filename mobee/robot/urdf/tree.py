@@ -6,7 +6,7 @@ A frame is an element `<origin xyz=... rpy=...>`; rpy are rotations about the fi
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 from math import atan2, cos, hypot, sin
 from typing import NoReturn
@@ -21,6 +21,8 @@ MOVING = ("revolute", "continuous", "prismatic")
 MOST_LINKS = 1000
 LONGEST_NAME = 200
 JOINT_TAGS = ("origin", "parent", "child", "axis", "calibration", "dynamics", "limit", "mimic", "safety_controller", "mobee")
+JOINT_ATTRIBUTES = {"axis": ("xyz",), "limit": ("lower", "upper", "velocity", "effort"), "mimic": ("joint", "multiplier", "offset")}
+XACRO_DEFINITIONS = ("property", "arg", "macro")
 FREE = {
     "floating": "moves freely in space, which this library has no joint for",
     "planar": "moves freely in a plane, which this library has no joint for",
@@ -66,7 +68,11 @@ class Tree:
 
 
 def read_tree(robot: Node) -> Tree:
-    """Return the checked tree of a <robot>; raises RobotFileError for duplicate names, missing links, loops and a second root."""
+    """Return the checked tree of a <robot>; warns of misspelt attributes of its joints.
+
+    Raises RobotFileError for duplicate names, missing links, loops, a second root, and tags that xacro has not replaced.
+    """
+    _refuse_xacro(robot)
     links: dict[str, Node] = {}
     joints: dict[str, UrdfJoint] = {}
     for node in robot:
@@ -85,6 +91,39 @@ def read_tree(robot: Node) -> Tree:
     if len(links) > MOST_LINKS:
         robot.fail("link", f"has {len(links)} links", f"Remove what does not move: at most {MOST_LINKS} can be read")
     return _connect(robot, links, joints)
+
+
+def _refuse_xacro(robot: Node) -> None:
+    """Raise RobotFileError for the first tag of xacro in the root, in a link or in a joint; the other elements are not read."""
+    # Only the namespace makes a tag one of xacro, so a file may give it another prefix.
+    bound = [name[6:].lower() for name, value in robot.attributes.items() if name.startswith("xmlns:") and value.endswith("xacro")]
+    prefixes = {"xacro", *bound}
+    for part in robot:
+        waiting = [part]
+        while waiting:
+            node = waiting.pop()
+            prefix, colon, tag = node.tag.partition(":")
+            if colon and prefix in prefixes:
+                # A definition alone adds nothing, so a robot with a leftover one is complete. Every other tag (an include, a condition, the
+                # call of a macro) stands for content that may be links: without an error a hand would be missing from all contact tests.
+                if tag in XACRO_DEFINITIONS:
+                    continue
+                remedy = f"Run xacro first: xacro {node.file.name} > {node.file.stem}_expanded.urdf, then use the new file"
+                node.fail("tag", "this tag of xacro is not replaced by its content, so a part of the robot is missing", remedy)
+            if part.tag in ("link", "joint"):
+                waiting += reversed(node.children)
+
+
+def check_spelling(node: Node, known: Collection[str]) -> None:
+    """Warn of each attribute that is similar to one of the `known` names that the element does not have.
+
+    Other unknown attributes cause no warning, since programs add their own (`<limit acceleration=...>`, `drake:effort`). For the same
+    reason an attribute is no misspelling if the known one is there too (`effort` and `max_effort`).
+    """
+    absent = [name for name in known if name not in node.attributes]
+    for name in node.attributes:
+        if name not in known and ":" not in name and (near := nearest(name, absent)):
+            node.warn(f"unknown attribute {shown(name)!r} is ignored. {near}Valid: {listed(known)}")
 
 
 def read_name(node: Node, attribute: str = "name") -> str:
@@ -108,6 +147,10 @@ def _read_joint(node: Node) -> UrdfJoint:
         remedy = 'Write type="fixed" where the robot stands; for a moving base write prismatic and revolute joints, one after the other'
         node.fail("type", f"a {kind} joint {FREE[kind]}", remedy)
     node.choice("type", kind, (*MOVING, "fixed"), "type of joint")
+    for inner in node:
+        if kind != "fixed" and inner.tag in JOINT_ATTRIBUTES:  # a fixed joint needs none of them
+            known = JOINT_ATTRIBUTES[inner.tag]
+            check_spelling(inner, [name for name in known if kind != "continuous" or name not in ("lower", "upper")])
     return UrdfJoint(node, node.text("name"), kind, _end(node, "parent"), _end(node, "child"), read_origin(node), _axis(node, kind))
 
 

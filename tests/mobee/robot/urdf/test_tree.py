@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -95,3 +96,47 @@ def test_a_chain_of_a_thousand_links_is_read_and_a_longer_one_refused(tmp_path: 
     assert len(read_urdf(chain(1000)).joints) == 999
     with pytest.raises(RobotFileError, match="has 1001 links"):
         read_urdf(chain(1001))
+
+
+XACRO = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
+CALLS = {
+    "an include": '<xacro:include filename="hand.xacro"/>',
+    "the call of a macro": '<xacro:hand parent="lower"/>',
+    "a condition": '<xacro:if value="1"><link name="hand"/></xacro:if>',
+    "a call in a link": '<link name="hand"><xacro:box_inertia m="1"/></link>',
+    "a call deep in a link": '<link name="hand"><collision><geometry><xacro:palm/></geometry></collision></link>',
+    "a call in a joint": '<joint name="wrist" type="fixed"><xacro:insert_block name="origin"/></joint>',
+    "another prefix": '<Xa:include filename="hand.xacro"/>',
+}
+UNUSED = {
+    "nothing": "",
+    "a property": '<xacro:property name="width" value="0.03"/>',
+    "an argument": '<xacro:arg name="side" default="left"/>',
+    "the definition of a macro": '<xacro:macro name="hand" params="side"><link name="${side}_hand"/><xacro:finger/></xacro:macro>',
+    "a call in an element that is not read": "<gazebo><xacro:control/></gazebo>",
+    "a call in a comment": "<!-- <xacro:hand/> -->",
+    "a tag of another program": '<drake:joint name="j" type="ball"/>',
+}
+
+
+def xacro_file(folder: Path, line: str) -> Path:
+    path = urdf_file(folder, *ARM, line)
+    path.write_text(
+        path.read_text().replace("<robot", f'<robot {XACRO} xmlns:Xa="http://wiki.ros.org/xacro" xmlns:drake="http://drake.mit.edu"')
+    )
+    return path
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_a_tag_that_xacro_has_not_replaced_is_refused(tmp_path: Path, name: str) -> None:
+    path = xacro_file(tmp_path, CALLS[name])
+    remedy = r"Run xacro first: xacro toy\.urdf > toy_expanded\.urdf"
+    with pytest.raises(RobotFileError, match=rf"toy\.urdf:7: <xa(cro)?:\w+> tag: .*a part of the robot is missing\. {remedy}"):
+        read_urdf(path)
+
+
+@pytest.mark.parametrize("name", UNUSED)
+def test_leftovers_of_xacro_that_add_nothing_are_silent(tmp_path: Path, name: str) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert read_urdf(xacro_file(tmp_path, UNUSED[name])).links == ("base", "upper", "lower")
