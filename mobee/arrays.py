@@ -34,6 +34,13 @@ def real_array(what: str, given: ArrayLike) -> Array:
     raise InvalidValue(f"{what} is complex, {value.ravel()[:1].tolist()} first; it must be real numbers.")
 
 
+def checked_seed(seed: int) -> int:
+    """Return the given seed as an int; raises InvalidValue unless it is a whole number of at least 0."""
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise InvalidValue(f"seed {seed!r}: must be a whole number, 0 or more")
+    return int(seed)
+
+
 def checked_threads(threads: int) -> int:
     """Return the given number of threads unchanged; raises InvalidValue if it is not a whole number from 1 to MAX_THREADS (1024)."""
     if isinstance(threads, bool) or not isinstance(threads, int) or not 1 <= threads <= MAX_THREADS:

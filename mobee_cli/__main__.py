@@ -72,9 +72,21 @@ def main(argv: Sequence[str] | None = None) -> int:
         code = _main(arguments)
         sys.stdout.flush()
     except BrokenPipeError:  # the reader has closed the pipe, as `head` does
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _discard_output()
         return 0
+    except OSError as error:
+        what = error.filename or "a file or the output"
+        print(f"{' '.join(['mobee', *arguments[:1]])}: {what} cannot be read or written ({error.strerror or error})", file=sys.stderr)
+        try:
+            sys.stdout.flush()
+        except OSError:  # it is the output, which Python would try to write once more
+            _discard_output()
+        return ENVIRONMENT
     return code
+
+
+def _discard_output() -> None:
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _main(arguments: list[str]) -> int:

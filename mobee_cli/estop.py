@@ -16,11 +16,12 @@ from mobee_cli.connect import add_endpoint, connected
 from mobee_cli.errors import UserError
 from services.common import rpc
 from services.common.bus import Bus
-from services.common.emergency_stop import StopRecord, StopSender
+from services.common.emergency_stop import StopLine, StopRecord, StopSender
 from services.common.exit_codes import ENVIRONMENT
 from services.common.observe import Received, alive, listen
 
 _REPEAT, _PATIENCE, _CONNECT_PATIENCE = 0.1, 5.0, 2.0  # s; a machine under attack is slow
+_SILENCE = 0.5  # s without any state of a part, after which the confirmation by robot_sim is sufficient
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -41,12 +42,12 @@ def run(arguments: argparse.Namespace) -> int:
         sender.send()
         try:
             with connected(arguments.endpoint, _CONNECT_PATIENCE) as session:
-                parts = _stop(session, sender, reason)
+                stopped = _stop(session, sender, reason)
         except UserError as error:
             if error.code == ENVIRONMENT and (kept := _kept(sender, recorded)):  # there is no router
                 raise UserError(f"{error} {kept}", ENVIRONMENT) from None
             raise
-    print(f"stopped: {', '.join(parts)}; `mobee estop --reset` releases the robot")
+    print(f"stopped: {stopped}; `mobee estop --reset` releases the robot")
     return 0
 
 
@@ -77,27 +78,33 @@ def _kept(sender: StopSender, recorded: bool) -> str:
     return "The stop is recorded: robot_sim obeys the record if it still runs, and comes up stopped if it does not." if recorded else ""
 
 
-def _stop(session: Any, sender: StopSender, reason: str) -> list[str]:
-    """Repeat the stop until every part of the robot reports it; return the names of the parts, sorted.
+def _stop(session: Any, sender: StopSender, reason: str) -> str:
+    """Repeat the stop until every part of the robot reports it; return what has stopped, as a text.
 
-    Raises UserError if a part does not report it in time, or if no part publishes its state.
+    No part publishes its state in a pause, and while lockstep waits. Then the stop is repeated until robot_sim confirms it. Raises
+    UserError if a part does not report the stop in time, or if no part publishes its state and robot_sim does not confirm the stop.
     """
     stopped: dict[str, bool] = {}  # by part; never False again: a repetition after a release would undo it
+    begin = heard = time.monotonic()  # `heard`: of the newest state of any part
 
     def note(received: Received) -> None:
-        part = received.key.partition("/")[0]
+        nonlocal heard
+        heard, part = received.at, received.key.partition("/")[0]
         stopped[part] = stopped.get(part, False) or received.content()["gate"] == "estop"
 
     listen(session, State.stream.keys(), note)
+    line, is_confirmed = StopLine(session), False
     publisher = Bus(session, "mobee", logging.getLogger("mobee")).publisher(EStop)
-    give_up = time.monotonic() + _PATIENCE
-    while time.monotonic() < give_up:
+    while time.monotonic() < begin + _PATIENCE:
         publisher.put(set=True, source="mobee", reason=reason)
         sender.send()
         time.sleep(_REPEAT)
         seen = dict(stopped)
         if seen and all(seen.values()):
-            return sorted(seen)
+            return ", ".join(sorted(seen))
+        is_confirmed |= sender.is_confirmed() or any(stop.src == "robot_sim" for stop in line.take())
+        if is_confirmed and time.monotonic() > heard + _SILENCE:
+            return "all parts, as robot_sim confirms (no part publishes its state, as in a pause)"
     moving = [part for part, is_stopped in stopped.items() if not is_stopped]
     result = f"{', '.join(moving)} did not stop" if moving else "no part of a robot publishes its state"
     kept = ". The launcher keeps the stop: robot_sim comes up stopped" if "launcher" in alive(session) else ""

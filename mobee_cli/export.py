@@ -61,6 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
     what = "transitions" if arguments.reaches is None else "reaches"
     if file == _IN_THE_RUN:
         file = (arguments.run if arguments.run.is_dir() else arguments.run.parent) / f"{what}.{kind}"
+    _require_no_source(file, arguments.run)
     try:
         if arguments.reaches is not None:
             rows = write_reaches(file, arguments.run)
@@ -73,6 +74,13 @@ def run(arguments: argparse.Namespace) -> int:
     unit = "transitions" if arguments.reaches is None else "steps"
     print(json.dumps({"file": str(file), unit: rows}) if arguments.json else f"{file}: {rows} {unit}")
     return 0
+
+
+def _require_no_source(file: Path, run: Path) -> None:
+    """Raise UserError if the file to write is one of those that are read, or has the ending of such a file."""
+    is_read = file.exists() and any(file.samefile(source) for source, _ in stores_of(run))
+    if is_read or file.suffix.lower() in (".sqlite", ".npz"):
+        raise UserError(f"{file}: the table must not replace the data of a run: give a file whose name ends in .csv or .parquet", BAD_INPUT)
 
 
 def write_csv(file: Path, records: Iterable[Record]) -> int:

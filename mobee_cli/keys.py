@@ -79,6 +79,7 @@ def _new(folder: Path, arguments: argparse.Namespace) -> int:
     _check_days(arguments.days)
     names = [*SERVICES, *(f"{AGENT}{part}" for part in arguments.parts), *PERSONS]
     identities: list[tuple[str, Party | None]] = [(ROUTER, None), *((name, party_of(name)) for name in names)]
+    _require_names([name for name, _ in identities])
     keys = KeyFolder.new(folder, identities, arguments.days)
     given = "" if folder == default_folder() else f" --keys {folder}"
     print(f"made {len(keys.issued())} identities in {folder}, which only you can read:")
@@ -98,6 +99,7 @@ def _add(folder: Path, arguments: argparse.Namespace) -> int:
     from services.common.certificates import KeyFolder
 
     _check_days(arguments.days)
+    _require_names(arguments.names)
     keys = KeyFolder(folder)
     known = {one.name: one.party for one in keys.issued()}
     identities = [
@@ -126,6 +128,16 @@ def _party(name: str, given: Party | None) -> Party | None:
             BAD_INPUT,
         )
     return given
+
+
+def _require_names(names: list[str]) -> None:
+    """Raise UserError for the first of the names that cannot be that of an identity."""
+    from services.common.certificates import require_names
+
+    try:
+        require_names(names)
+    except BadKeys as error:
+        raise UserError(str(error), BAD_INPUT) from None
 
 
 def _check_days(days: int) -> None:

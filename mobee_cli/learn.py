@@ -11,9 +11,8 @@ from pathlib import Path
 from experiments.kit.command_line import positive_whole
 from experiments.kit.track import add_track, require_tracker, tracked
 from mobee.errors import MobeeError, NotInstalled
-from mobee.robot.load import load_robot
 from mobee_cli.errors import UserError
-from mobee_cli.playing.files import Files, write_files
+from mobee_cli.playing.files import Files, robot_as_written, write_files
 from mobee_cli.playing.offline import learn, opened
 from mobee_cli.playing.setup import add_setup_options, setup_of
 from mobee_cli.robot_options import DEFAULT, add_robot, add_world
@@ -49,11 +48,11 @@ def run(arguments: argparse.Namespace) -> int:
     try:
         require_tracker(arguments.track)
         setup = setup_of(arguments, arguments.robot or DEFAULT)
-        write_files(setup, files)
+        _require_no_loss(arguments, [files.scenario] if setup.shipped else [files.robot, files.scenario], files.store)
         for line in setup.lines:
             say(line)
-        robot = load_robot(setup.shipped or files.robot)
-        with tracked(curves) if arguments.track else nullcontext(), opened(setup, robot, files.store) as learning:
+        with tracked(curves) if arguments.track else nullcontext(), opened(setup, robot_as_written(setup), files.store) as learning:
+            write_files(setup, files)  # not before the store is accepted: a refused command changes no file
             learn(learning, None, arguments.transitions, say)
             numbers, summary = learning.numbers(), learning.summary()
             say(learning.report())
@@ -69,3 +68,17 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.track:
         print(f"Curves: tensorboard --logdir {curves}")
     return 0
+
+
+def _require_no_loss(arguments: argparse.Namespace, written: list[Path], store: Path) -> None:
+    """Raise UserError if one of the paths to write is a file that the command reads, or that `mobee learn` has not written.
+
+    The files that it has written are beside their store.
+    """
+    for path in filter(Path.exists, written):
+        for name in ("robot", "world", "srdf"):
+            given = getattr(arguments, name)
+            if given is not None and Path(given).exists() and path.samefile(given):
+                raise UserError(f"--{name} {given}: `mobee learn` would replace this file: give --store another name", BAD_INPUT)
+        if not store.exists():
+            raise UserError(f"{path} exists and would be replaced, although there is no {store}: give --store another name", BAD_INPUT)

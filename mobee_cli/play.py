@@ -18,7 +18,7 @@ from mobee_cli.launch import add_settings
 from mobee_cli.playing.files import Files, free_folder, remove_files, write_files, write_readme
 from mobee_cli.playing.offline import learn, opened
 from mobee_cli.playing.setup import ICUB, Setup, add_setup_options, setup_of
-from mobee_cli.robot_options import add_cameras, add_urdf_options, add_world
+from mobee_cli.robot_options import add_cameras, add_urdf_options, add_world, given_options
 from services.common.exit_codes import BAD_INPUT, INTERRUPTED
 from services.launcher.run import Options, launch, refused_now
 
@@ -32,7 +32,7 @@ the page is in the table of services; Ctrl-C ends everything. docs/play.md."""
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `mobee play`, the robot and the options, to the parser."""
     parser.epilog = _NOTES
-    parser.add_argument("robot", nargs="?", default=ICUB, metavar="ROBOT", help="name or file of a robot (default: the iCub at its table)")
+    parser.add_argument("robot", nargs="?", metavar="ROBOT", help="name or file of a robot (default: the iCub at its table)")
     add_urdf_options(parser)
     add_world(parser)
     add_cameras(parser)
@@ -56,13 +56,14 @@ def run(arguments: argparse.Namespace) -> int:
     Returns the exit code, which is that of the live system if one is started.
     """
     if arguments.learned is not None:
+        _require_no_setup(arguments)
         files = Files(arguments.learned)
         if not files.store.is_file() or not files.scenario.is_file():
             raise UserError(f"{files.scenario}: no such scenario beside {files.store}: make both with `mobee learn`", BAD_INPUT)
         return _live(arguments, files)
     say = _to_stderr if arguments.json else _to_stdout
     try:
-        setup = setup_of(arguments, arguments.robot)
+        setup = setup_of(arguments, arguments.robot or ICUB)
         files = _files(arguments, setup)
         for line in setup.lines:
             say(line)
@@ -71,7 +72,12 @@ def run(arguments: argparse.Namespace) -> int:
         if not arguments.offline_only and (code := refused_now(_options(arguments, files))):  # before it learns for seconds
             remove_files(files)
             return code
-        numbers = _offline(arguments, setup, files, say)
+        try:
+            numbers = _offline(arguments, setup, files, say)
+        except MobeeError:
+            if not files.store.exists():  # it has learned nothing
+                remove_files(files)
+            raise
     except MobeeError as error:
         raise UserError(str(error), BAD_INPUT) from None
     if arguments.offline_only:
@@ -83,10 +89,19 @@ def run(arguments: argparse.Namespace) -> int:
     return _live(arguments, files)
 
 
+def _require_no_setup(arguments: argparse.Namespace) -> None:
+    """Raise UserError if the user has given --learned, and with it an option or a robot that only a new setup can use."""
+    given = given_options(arguments, ("world", "explorer", "seed", "seconds", "transitions", "save"))
+    given += [arguments.robot] * (arguments.robot is not None) + ["--part"] * bool(arguments.parts)
+    given += ["--offline-only"] * arguments.offline_only
+    for option in given:
+        raise UserError(f"{option}: not valid with --learned, which continues live what `mobee learn` has set up: leave it out", BAD_INPUT)
+
+
 def _files(arguments: argparse.Namespace, setup: Setup) -> Files:
     """Return the paths of the files of this run, in the folder of --save, or in a new folder without --save.
 
-    Raises UserError if the folder already contains a scenario of the same name.
+    Raises UserError if one of the files exists already.
     """
     if arguments.save is None:
         name = f"{time.strftime('%Y%m%d-%H%M%S')}-play-{setup.name}"
@@ -94,6 +109,7 @@ def _files(arguments: argparse.Namespace, setup: Setup) -> Files:
     files = Files(arguments.save / f"{setup.name}.sqlite")
     if files.scenario.exists():
         raise UserError(f"{files.scenario} exists: run it with `mobee launch {files.scenario}`, or save into another folder", BAD_INPUT)
+    files.require_absent()
     return files
 
 

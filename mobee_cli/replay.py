@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.epilog = _NOTES
     parser.add_argument("run", type=Path, metavar="RUN", help="folder of a run, or a recording")
     what = parser.add_mutually_exclusive_group()
-    what.add_argument("--into", choices=("controller", "model"), help="play the run into this service, and compare what it says")
+    what.add_argument("--into", choices=("controller", "model"), help="play a run in lockstep into this service, and compare what it says")
     what.add_argument("--diff", type=Path, metavar="RUN", help="print the first difference of this run and another")
     what.add_argument("--messages", action="store_true", help="play the recorded messages, also where the run had a monitor")
     parser.add_argument("--ticks", type=positive_whole, default=sys.maxsize, metavar="N", help="--into: end after tick N")

@@ -52,10 +52,28 @@ def require_recording(save: Path | None) -> None:
 
     None is valid.
     """
-    if save is not None and save.suffix.lower() != ".rrd":
+    if save is None:
+        return
+    if save.suffix.lower() != ".rrd":
         raise UserError(f"--save {save}: recordings must have a name that ends in .rrd", BAD_INPUT)
-    if save is not None and not save.resolve().parent.is_dir():
-        raise UserError(f"--save {save}: there is no folder {save.resolve().parent}: create it", BAD_INPUT)
+    require_writable("--save", save)
+
+
+def require_writable(option: str, path: Path) -> None:
+    """Raise UserError if a file cannot be written to the path that an option has; the folder of the file must exist.
+
+    No file is made or changed.
+    """
+    if not path.resolve().parent.is_dir():
+        raise UserError(f"{option} {path}: there is no folder {path.resolve().parent}: create it", BAD_INPUT)
+    existed = path.exists()
+    try:
+        with path.open("ab"):
+            pass
+    except OSError as error:
+        raise UserError(f"{option} {path}: cannot be written ({error.strerror}): give another file", BAD_INPUT) from None
+    if not existed:
+        path.unlink()
 
 
 def show(robot: Robot, world: World | None, save: Path | None, stretches: Sequence[Any] | None = None, solids: bool = False) -> int:

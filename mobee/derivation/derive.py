@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mobee.arrays import Array
+from mobee.arrays import Array, checked_seed
 from mobee.control.gains import Gains
 from mobee.derivation.arms import Chain, bounded, chains, joints_to_learn, movements, names_of
 from mobee.derivation.separation import field_width, free_home, home_apart, often_touching, reach_of, with_cuts, with_fields, without_links
@@ -93,9 +93,10 @@ def derive(robot: Robot, parts: Mapping[str, Sequence[str]] | None = None, seed:
 
     Raises:
         InvalidValue: no motor moves the end of a chain; a part in `parts` is given no motors, or motors of another part; or `parts` names a
-            motor twice.
+            motor twice; or the seed is no whole number of at least 0.
         UnknownName: `parts` names a motor that the robot does not have.
     """
+    checked_seed(seed)
     robot, limited = bounded(robot)
     if parts:
         robot, arms = _requested(robot, parts)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from mobee._core import Table, address, numbers, view
 from mobee._core import plant as core
-from mobee.arrays import Array, Ints
+from mobee.arrays import Array, Ints, checked_seed
 from mobee.errors import InvalidValue
 from mobee.model.masses import gravity_torque
 from mobee.robot.motor_units import fine_units
@@ -167,7 +167,7 @@ class Motors:
         n = len(robot.motor_table)
         if np.shape(q) != (n,):
             raise InvalidValue(f"q of shape {np.shape(q)}: must be ({n},), a position for every motor of {robot.name}")
-        self.seed = _checked_seed(seed)
+        self.seed = checked_seed(seed) % 2**64
         self._robot = robot
         self.parameters = parameters
         self.living: Ints = np.arange(n) if alive is None else np.flatnonzero(alive)
@@ -203,7 +203,7 @@ class Motors:
 
         Commands that are still delayed have no effect.
         """
-        self.seed = _checked_seed(seed)
+        self.seed = checked_seed(seed) % 2**64
         self._rest(q)
         self.struct.seed, self.struct.noise_tick = self.seed, -1
 
@@ -333,13 +333,6 @@ class Motors:
         self.constants["delay"] = delay
         self._line = line
         self.struct.line, self.struct.rows, self.struct.newest = address(line), rows, rows - 1
-
-
-def _checked_seed(seed: int) -> int:
-    """Return the seed modulo 2^64, as the core reads it; raises InvalidValue unless it is a whole number of at least 0."""
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
-        raise InvalidValue(f"seed {seed!r}: must be a whole number, 0 or more")
-    return int(seed) % 2**64
 
 
 def _constants(robot: Robot, parameters: MotorParameters) -> Table:

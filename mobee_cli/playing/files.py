@@ -3,16 +3,20 @@
 
 from __future__ import annotations
 
+import os
+import tempfile
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from mobee.errors import InvalidValue
+from mobee.robot.load import load_robot
+from mobee.robot.robot import Robot
 from mobee.robot.xml.write import write_xml
 from mobee_cli.errors import UserError
 from mobee_cli.playing.setup import Setup
-from services.common.exit_codes import FAILED
+from services.common.exit_codes import BAD_INPUT, FAILED
 from services.common.worlds import NO_WORLD, is_path
 from services.launcher.run_directory import to_toml
 
@@ -32,7 +36,7 @@ class Files:
     def robot(self) -> Path:
         """The path of the robot file with the parts that were derived for the agents, in zero-position XML (mobee's own format).
 
-        For a shipped robot this file does not exist.
+        For a shipped robot this file is not written.
         """
         return self.store.with_suffix(".xml")
 
@@ -43,6 +47,28 @@ class Files:
         In the scenario the agents continue to learn live, beginning with the transitions in `store`.
         """
         return self.store.with_suffix(".toml")
+
+    @property
+    def readme(self) -> Path:
+        """The path of the README.md of the folder, which explains the files; only `mobee play` writes it."""
+        return self.store.with_name(README)
+
+    def require_absent(self) -> None:
+        """Raise UserError if one of the files exists, or a README.md in their folder: `mobee play` would replace it."""
+        for path in (self.robot, self.store, self.readme):
+            if os.path.lexists(path):
+                raise UserError(f"{path} exists and would be replaced: save into another folder", BAD_INPUT)
+
+
+def robot_as_written(setup: Setup) -> Robot:
+    """Return the robot of a setup as the live system will load it, by its shipped name or from the file that `write_files` writes.
+
+    No file remains. Raises InvalidValue if the robot has properties that its file cannot express.
+    """
+    if setup.shipped:
+        return load_robot(setup.shipped)
+    with tempfile.TemporaryDirectory(prefix="mobee-robot-") as folder:
+        return load_robot(write_xml(setup.robot, Path(folder) / "robot.xml"))
 
 
 def write_files(setup: Setup, files: Files) -> None:
@@ -98,12 +124,15 @@ What was derived:
 {derived}
 ```
 """
-    files.store.with_name(README).write_text(text, encoding="utf-8")
+    files.readme.write_text(text, encoding="utf-8")
 
 
 def remove_files(files: Files) -> None:
-    """Remove the files that `write_files` and `write_readme` have written, and their folder if it is then empty."""
-    for path in (files.robot, files.scenario, files.store.with_name(README)):
+    """Remove the files that `write_files` and `write_readme` have written, and their folder if it is then empty.
+
+    Before these functions wrote, none of the files may have existed.
+    """
+    for path in (files.robot, files.scenario, files.readme):
         path.unlink(missing_ok=True)
     with suppress(OSError):  # it is not empty
         files.store.parent.rmdir()

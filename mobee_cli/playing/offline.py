@@ -13,6 +13,7 @@ from typing import Any
 
 from experiments.kit.command_line import Progress
 from mobee.control.law import largest_step
+from mobee.errors import MobeeError
 from mobee.learning.agent import CuriousAgent, run
 from mobee.model.model import Model
 from mobee.robot.robot import Robot
@@ -116,17 +117,27 @@ def opened(setup: Setup, robot: Robot, store: Path) -> Iterator[Learning]:
     loaded from the same file or name as in the live system, so that offline and live learning have exactly the same state spaces. `store`:
     file of the transitions. The agents first learn the transitions that it already contains.
     """
-    world = world_around(setup.world, setup.shipped or store)
+    model = Model(robot, world_around(setup.world, setup.shipped or store))
+    learners = {part: (config.space(robot), config.curious()) for part, config in setup.agents.items()}  # before a store is made
     dt = next((tick for tick in TICKS if tick < largest_step(robot, setup.law)), TICKS[-1])
+    store.parent.mkdir(parents=True, exist_ok=True)
     with ExitStack() as open_meanwhile:
         stores = {part: open_meanwhile.enter_context(TransitionStore(store, part, durable=False)) for part in setup.agents}
+        for one in stores.values():
+            _require_robot(one, robot.name)
         begun = sum(len(one.load()) for one in stores.values())
         seed = next(iter(setup.agents.values())).seed
-        plant = OfflinePlant(Model(robot, world), seed + begun, setup.law, dt=dt, active=list(setup.agents))
-        agents = tuple(
-            CuriousAgent(config.space(robot), plant, settings=config.curious(), store=stores[part]) for part, config in setup.agents.items()
-        )
+        plant = OfflinePlant(model, seed + begun, setup.law, dt=dt, active=list(setup.agents))
+        agents = tuple(CuriousAgent(space, plant, settings=settings, store=stores[part]) for part, (space, settings) in learners.items())
         yield Learning(plant, agents, begun)
+
+
+def _require_robot(store: TransitionStore, name: str) -> None:
+    """Raise MobeeError if an agent in the file of a store, of any part, was recorded with a robot that has another name."""
+    for agent in store.agents():
+        recorded = store.settings(agent).get("space", {}).get("robot", name)
+        if recorded != name:
+            raise MobeeError(f"{store.path} has transitions of robot {recorded!r}, not {name!r}: name this robot, or use another file.")
 
 
 def learn(learning: Learning, seconds: float | None, transitions: int | None, say: Callable[[str], None]) -> None:

@@ -9,13 +9,16 @@ import re
 import warnings
 from collections.abc import Iterator, Sequence, Sized
 from dataclasses import dataclass
+from typing import Any
 
 from mobee.control.gains import Gains
 from mobee.derivation import Arm, Derived, derive
 from mobee.errors import InvalidValue
+from mobee.learning.explorers import EXPLORERS
 from mobee.robot.cameras import cameras_of, key_of
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
+from mobee.settings import named
 from mobee.vision.objects.thing import things_in
 from mobee_cli.robot_options import urdf_options
 from services.agents.config import Config as AgentConfig
@@ -23,6 +26,7 @@ from services.common.cameras import STEREO
 from services.common.worlds import effective_world, world_around
 
 WIDTH = 80  # columns
+LONGEST_NAME = 64  # characters of a robot's name that files and folders are named by: file systems allow 255 bytes
 ICUB = "icub"
 PUBLISHED = ("torso", "left_arm", "right_arm")  # the parts that learn in thesis 7.4
 
@@ -61,8 +65,8 @@ def add_setup_options(parser: argparse.ArgumentParser) -> None:
     """Add the options that choose the agents to a parser: --part, --explorer and --seed."""
     text = "motors that a part learns with, for example arm=joint1,joint2,joint4; may be repeated (default: derived)"
     parser.add_argument("--part", dest="parts", action="append", default=[], metavar="PART=M1,M2", help=text)
-    parser.add_argument("--explorer", default="curious", metavar="NAME", help="how the agents choose actions (default: curious)")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of all random draws (default: 0)")
+    parser.add_argument("--explorer", metavar="NAME", help="how the agents choose actions (default: curious)")
+    parser.add_argument("--seed", type=int, metavar="N", help="seed of all random draws (default: 0)")
 
 
 def setup_of(arguments: argparse.Namespace, robot: str) -> Setup:
@@ -73,7 +77,12 @@ def setup_of(arguments: argparse.Namespace, robot: str) -> Setup:
     """
     options = {name: value for name, value in urdf_options(arguments).items() if value is not None}
     parts = _parts(arguments.parts)
-    common = {"explorer": arguments.explorer, "seed": arguments.seed}
+    seed = 0 if arguments.seed is None else arguments.seed
+    if seed < 0:
+        raise InvalidValue(f"--seed {seed}: must be 0 or more.")
+    explorer = "curious" if arguments.explorer is None else arguments.explorer
+    named("explorer", explorer, EXPLORERS)  # an unknown one is refused before a file is written
+    common: dict[str, Any] = {"explorer": explorer, "seed": seed}
     world = effective_world(arguments.world, robot)
     asked = tuple(getattr(arguments, "cameras", ()))  # `mobee learn` has no such option
     if robot == ICUB and not parts and not options:
@@ -84,14 +93,14 @@ def setup_of(arguments: argparse.Namespace, robot: str) -> Setup:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         loaded = load_robot(robot, **options)
-    derived = derive(loaded, parts, arguments.seed)
+    derived = derive(loaded, parts, seed)
     agents = {
         arm.part: AgentConfig(part=arm.part, joints=arm.joints, rest=derived.rest(arm), neighbours=_neighbours(derived, arm), **common)
         for arm in derived.arms
     }
     gains = "default" if derived.gains == Gains.default() else "derived"
     remarks = [str(one.message).rpartition(":1: ")[2] for one in caught]
-    name = key_of(loaded.name, "robot")
+    name = key_of(loaded.name, "robot")[:LONGEST_NAME]
     cameras = cameras_of(derived.robot, asked)
     eyes, lines = _eyes(cameras, world, name), tuple(_described(derived, remarks, list(cameras)))
     return Setup(name, "", derived.robot, world, gains, agents, lines, asked, eyes)
@@ -136,7 +145,8 @@ def _described(derived: Derived, remarks: Sequence[str], cameras: Sequence[str])
     There are at most nine lines, and one more for each arm, each of at most WIDTH columns.
     """
     robot = derived.robot
-    yield _cut(f"{robot.name}: {len(robot.motors)} motors in {len(robot.parts)} parts, {len(robot.shapes)} shapes")
+    motors, parts, shapes = (_counted(len(robot.motors), "motor"), _counted(len(robot.parts), "part"), _counted(len(robot.shapes), "shape"))
+    yield _cut(f"{robot.name}: {motors} in {parts}, {shapes}")
     for remark in remarks[:2]:
         yield _cut(f"  note   {remark}")
     for arm in derived.arms:
@@ -153,8 +163,12 @@ def _described(derived: Derived, remarks: Sequence[str], cameras: Sequence[str])
         pairs = ", ".join(f"{one}/{other}" for one, other in derived.left_out)
         yield _cut(f"  pairs  {len(derived.left_out)} not tested, as they touch in most poses: {pairs}")
     if derived.field:
-        clauses = f", {len(robot.clauses)} clauses" if robot.clauses else ""
-        yield _cut(f"  fields {1e3 * derived.field:.0f} mm wide, {len(robot.field_pairs)} pairs{clauses}")
+        clauses = f", {_counted(len(robot.clauses), 'clause')}" if robot.clauses else ""
+        yield _cut(f"  fields {1e3 * derived.field:.0f} mm wide, {_counted(len(robot.field_pairs), 'pair')}{clauses}")
+
+
+def _counted(number: int, thing: str) -> str:
+    return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
 
 
 def _listed(names: Sequence[str]) -> str:

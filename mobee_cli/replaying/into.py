@@ -109,7 +109,8 @@ class _Replay:
         """Play a tick; returns False once a difference was found."""
         self._note_drives(tick)
         if not self._begun:
-            self._begin(tick)
+            if tick.of("Tick"):  # else the recording begins later, and a later tick has the mode of the run
+                self._begin(tick)
             return True
         own = self._own(tick)
         at = next((index for index, item in enumerate(own) if self._role.answers(item)), len(own))
@@ -130,13 +131,14 @@ class _Replay:
 
         Raises MobeeError if the recording does not begin at tick 0, or was not made in lockstep.
         """
-        if tick.k != 0 or not tick.of("Tick"):
-            raise MobeeError(
-                "the recording does not begin at tick 0 of a run: its first file is needed, and a recorder that was there first"
-            )
         if tick.of("Tick")[-1].content()["mode"] != "lock":
             raise MobeeError(
-                'the recorded run was not in lockstep (shared.mode = "lock"), so its messages do not say when each was handled'
+                'the recorded run was not in lockstep (shared.mode = "lock"), so its messages do not say when each was handled: record one '
+                "with `mobee launch lockstep`, or with `--set shared.mode=lock`"
+            )
+        if tick.k != 0:
+            raise MobeeError(
+                "the recording does not begin at tick 0 of a run: its first file is needed, and a recorder that was there first"
             )
         self._begun = True
         self._tokens(tick)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import textwrap
 from dataclasses import replace
 from pathlib import Path
@@ -36,8 +37,19 @@ def add_map(parser: argparse.ArgumentParser) -> None:
 
 def add_places(parser: argparse.ArgumentParser) -> None:
     """Add the options --to (goal) and --from (start) to a parser."""
-    parser.add_argument("--to", nargs="+", type=float, required=True, metavar="Y", help="goal: task coordinates")
-    parser.add_argument("--from", nargs="+", type=float, dest="start", metavar="Y", help="start (default: home)")
+    parser.add_argument("--to", nargs="+", type=_finite, required=True, metavar="Y", help="goal: task coordinates")
+    parser.add_argument("--from", nargs="+", type=_finite, dest="start", metavar="Y", help="start (default: home)")
+
+
+def _finite(text: str) -> float:
+    """Return the finite number that a text states; raises argparse.ArgumentTypeError for any other text."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a finite number")
+    return number
 
 
 def map_given(arguments: argparse.Namespace) -> Roadmap:

@@ -20,7 +20,7 @@ from mobee_cli.connect import add_endpoint
 from mobee_cli.errors import UserError
 from mobee_cli.roadmap.map_file import PLACES, add_map, add_places, map_given, start_of, wrapped
 from mobee_cli.roadmap.query import find_path, require_free
-from mobee_cli.roadmap.show import marker_of
+from mobee_cli.roadmap.show import marker_of, require_picture
 from services.common.exit_codes import BAD_INPUT, FAILED
 
 DESCRIPTION = "Move the robot along a path of a roadmap under the control law, offline or live."
@@ -71,6 +71,8 @@ def run(arguments: argparse.Namespace) -> int:
         raise UserError(f"--speed {arguments.speed:g}: must be above 0 and at most 1", BAD_INPUT)
     if arguments.live and arguments.world is not None:
         raise UserError(f"--world {arguments.world}: only valid offline; with --live the world is that of the running model", BAD_INPUT)
+    if arguments.picture is not None:
+        require_picture(arguments.picture)
     trm = map_given(arguments)
     if arguments.live:
         from mobee_cli.roadmap.live import play_live
@@ -91,8 +93,10 @@ def report(trm: Roadmap, path: dict[str, Any], played: Played, gains: Gains, arg
     """
     found = result_of(trm, path, played, arguments.tolerance) | held_off(trm, path, played, gains)
     if arguments.picture is not None:
-        found["picture"] = str(_filmstrip(trm, played, arguments.picture))
-    print(json.dumps(found, indent=2) if arguments.json else "\n".join(_lines(trm, found)))
+        found["picture"] = str(arguments.picture)
+    print(json.dumps(found, indent=2) if arguments.json else "\n".join(_lines(trm, found)), flush=True)
+    if arguments.picture is not None:  # after the result, which must not be lost if the picture cannot be drawn
+        _draw(trm, played, arguments.picture)
     return 0 if found["arrived"] else FAILED
 
 
@@ -174,11 +178,9 @@ def _lines(trm: Roadmap, found: dict[str, Any]) -> list[str]:
     return lines
 
 
-def _filmstrip(trm: Roadmap, played: Played, path: Path) -> Path:
+def _draw(trm: Roadmap, played: Played, path: Path) -> None:
     from mobee.rendering.sheet import Strip, filmstrip, motion_through
 
-    if path.suffix.lower() != ".png" or not path.resolve().parent.is_dir():
-        raise UserError(f"--picture {path}: give a name that ends in .png, in an existing folder", BAD_INPUT)
     rows = slice(None, None, 10)
     motion = motion_through(trm.model, played.q[rows], played.times[rows].tolist())
-    return filmstrip([Strip(motion, marker_of(trm))], path)
+    filmstrip([Strip(motion, marker_of(trm))], path)

@@ -19,7 +19,7 @@ from mobee.roadmap.playback import timed
 from mobee.roadmap.roadmap import Roadmap
 from mobee_cli.errors import UserError
 from mobee_cli.roadmap.map_file import add_map, as_json, edge_summary, map_given, summary, wrapped
-from mobee_cli.view import require_recording, show
+from mobee_cli.view import require_recording, require_writable, show
 from services.common.exit_codes import BAD_INPUT
 
 if TYPE_CHECKING:
@@ -45,6 +45,9 @@ def run(arguments: argparse.Namespace) -> int:
     trm = map_given(arguments)
     if arguments.view or arguments.save is not None:
         return _show_tour(trm, arguments.save)
+    picture: Path = arguments.picture or arguments.map.with_suffix(".png")
+    if len(trm.q):
+        require_picture(picture)
     marker = arguments.marker or marker_of(trm)
     trm.model.robot.marker(marker)
     result, lines = as_json(trm, arguments.map), [*summary(trm, arguments.map), *edge_summary(trm)]
@@ -53,10 +56,17 @@ def run(arguments: argparse.Namespace) -> int:
         result["touching"] = touching
         lines += wrapped(f"{touching or 'None'} of the {len(trm.edges)} edges {'has' if touching < 2 else 'have'} contacts.")
     if len(trm.q):
-        result["picture"] = str(_draw(trm, marker, arguments.picture or arguments.map.with_suffix(".png")))
+        result["picture"] = str(_draw(trm, marker, picture))
         lines += wrapped(f"Picture of {marker} in all poses: {result['picture']}")
     print(json.dumps(result, indent=2) if arguments.json else "\n".join(lines))
     return 0
+
+
+def require_picture(path: Path) -> None:
+    """Raise UserError if a picture cannot be written to the path: its name must end in .png, and its folder must exist."""
+    if path.suffix.lower() != ".png":
+        raise UserError(f"--picture {path}: the picture is a PNG: give a name that ends in .png", BAD_INPUT)
+    require_writable("--picture", path)
 
 
 def _show_tour(trm: Roadmap, save: Path | None) -> int:
@@ -69,10 +79,6 @@ def _show_tour(trm: Roadmap, save: Path | None) -> int:
 def _draw(trm: Roadmap, marker: str, path: Path) -> Path:
     from mobee.rendering.sheet import marker_cloud
 
-    if path.suffix.lower() != ".png":
-        raise UserError(f"--picture {path}: the picture is a PNG: give a name that ends in .png", BAD_INPUT)
-    if not path.resolve().parent.is_dir():
-        raise UserError(f"--picture {path}: there is no folder {path.resolve().parent}: create it", BAD_INPUT)
     shares = (trm.y - trm.y.mean(axis=0)) / trm.spacing
     middle = trm.q[int(np.linalg.norm(shares, axis=1).argmin())]
     return marker_cloud(trm.model, trm.q, marker, path, shown=middle, values=trm.y[:, 0])

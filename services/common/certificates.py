@@ -61,6 +61,8 @@ class KeyFolder:
         `identities`: pairs of name and party (role on the bus; None: the router). `days`: number of days for which the certificates of the
         identities are valid. Raises BadKeys if the folder contains files, or if a name is not valid; OSError if it cannot be written.
         """
+        wanted = list(identities)
+        require_names(name for name, _ in wanted)
         if path.exists() and any(path.iterdir()):
             raise BadKeys(
                 f"{path} holds files already, and keys in use must not be replaced: name another folder, or add to it with `keys add`"
@@ -78,7 +80,7 @@ class KeyFolder:
         _write(path / f"{AUTHORITY}.key", _pem(key))
         _write(path / f"{AUTHORITY}.crt", certificate.public_bytes(Encoding.PEM))
         folder = cls(path)
-        folder.add(identities, days)
+        folder.add(wanted, days)
         return folder
 
     def add(self, identities: Iterable[tuple[str, Party | None]], days: int = DAYS) -> None:
@@ -87,10 +89,10 @@ class KeyFolder:
         `identities`: pairs of name and party (role on the bus; None: the router). `days`: number of days for which the certificates are
         valid. Raises BadKeys if a name is not valid, or if the key of the authority is missing; OSError if a file cannot be written.
         """
+        wanted = list(identities)
+        require_names(name for name, _ in wanted)
         authority, key = self._authority(), self._authority_key()
-        for name, party in identities:
-            if not _NAME.fullmatch(name) or name == AUTHORITY:
-                raise BadKeys(f"{name!r} cannot name an identity: use a-z, 0-9 and _ only, and not {AUTHORITY!r}")
+        for name, party in wanted:
             own = ec.generate_private_key(ec.SECP256R1())
             use = ExtendedKeyUsageOID.SERVER_AUTH if name == ROUTER else ExtendedKeyUsageOID.CLIENT_AUTH
             built = (
@@ -158,6 +160,13 @@ class KeyFolder:
         if not isinstance(key, ec.EllipticCurvePrivateKey):
             raise BadKeys(f"{path} is not a key that `mobee keys new` has made")
         return key
+
+
+def require_names(names: Iterable[str]) -> None:
+    """Raise BadKeys for the first of the names that cannot be that of an identity."""
+    for name in names:
+        if not _NAME.fullmatch(name) or name == AUTHORITY:
+            raise BadKeys(f"{name!r} cannot name an identity: use 1 to 64 of a-z, 0-9 and _ only, and not {AUTHORITY!r}")
 
 
 def _checked(path: Path, authority: x509.Certificate) -> Issued:

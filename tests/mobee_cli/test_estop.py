@@ -6,6 +6,7 @@ from __future__ import annotations
 import logging
 import threading
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -17,7 +18,7 @@ from mobee_cli import estop
 from mobee_cli.__main__ import main
 from services.common.bus import Bus
 from services.common.emergency_stop import StopDatagrams, StopRecord
-from services.common.observe import listen
+from services.common.observe import Received, listen
 from services.common.session import open_router
 
 
@@ -29,13 +30,18 @@ class Robot:
         bus = Bus(self.session, "robot_sim", logging.getLogger("robot_sim"))
         self.gates = {"torso": "armed", "head": "armed"}
         self.deaf: set[str] = set()
+        self.is_paused = threading.Event()  # no part publishes its state
+        self.repeats = False  # the robot repeats a stop that it obeys
+        self.stops = bus.publisher(EStop)
         self.over = threading.Event()
         publishers = {part: bus.publisher(State, part) for part in self.gates}
-        listen(self.session, EStop.stream.key(), lambda heard: self.stop())
+        listen(self.session, EStop.stream.key(), self.stop)
         self.session.declare_queryable(keys.ESTOP_RESET, self.reset)
 
         def speak() -> None:
             while not self.over.wait(0.02):
+                if self.is_paused.is_set():
+                    continue
                 for part, publisher in publishers.items():
                     publisher.put(
                         q=[0.0],
@@ -52,8 +58,10 @@ class Robot:
         self.thread = threading.Thread(target=speak)
         self.thread.start()
 
-    def stop(self) -> None:
+    def stop(self, heard: Received) -> None:
         self.gates.update({part: "estop" for part in self.gates if part not in self.deaf})
+        if self.repeats and heard.content()["src"] != "robot_sim":
+            self.stops.put(set=True, source="mobee", reason="repeated")
 
     def release(self) -> None:
         self.gates.update(dict.fromkeys(self.gates, "hold"))
@@ -62,6 +70,26 @@ class Robot:
         self.release()
         with query:
             query.reply(keys.ESTOP_RESET, encode(Done(v=VERSION)), encoding=encoding_of(Done))
+
+
+@contextmanager
+def confirming(port: int) -> Iterator[set[str]]:
+    """Confirm each stop that arrives as a datagram; the set has the reasons of all."""
+    over, datagrams, reasons = threading.Event(), StopDatagrams(f"127.0.0.1:{port}"), set[str]()
+
+    def obey() -> None:
+        while not over.wait(0.01):
+            reasons.update(stop.reason for stop in datagrams.take())
+            datagrams.confirm()
+
+    thread = threading.Thread(target=obey)
+    thread.start()
+    try:
+        yield reasons
+    finally:
+        over.set()
+        thread.join()
+        datagrams.close()
 
 
 @pytest.fixture
@@ -91,7 +119,32 @@ def test_a_release_by_another_client_is_not_undone(robot: Robot, endpoint: str, 
     assert set(robot.gates.values()) == {"hold"}
 
 
-def test_a_part_that_does_not_stop_is_named(robot: Robot, endpoint: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_in_a_pause_the_robots_own_repetition_confirms_the_stop(robot: Robot, endpoint: str, capsys: pytest.CaptureFixture[str]) -> None:
+    robot.repeats = True
+    robot.is_paused.set()
+    assert main(["estop", "--endpoint", endpoint]) == 0
+    assert robot.gates == {"torso": "estop", "head": "estop"}
+    assert capsys.readouterr().out.startswith("stopped: all parts, as robot_sim confirms")
+
+
+def test_in_a_pause_the_answer_to_a_datagram_confirms_the_stop(
+    robot: Robot, endpoint: str, free_port: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    robot.is_paused.set()
+    with confirming(free_port):
+        assert main(["estop", "--endpoint", endpoint]) == 0
+    assert capsys.readouterr().out.startswith("stopped: all parts, as robot_sim confirms")
+
+
+def test_in_a_pause_a_stop_that_is_not_confirmed_is_reported(robot: Robot, endpoint: str, capsys: pytest.CaptureFixture[str]) -> None:
+    robot.is_paused.set()
+    assert main(["estop", "--endpoint", endpoint]) == 1
+    assert "no part of a robot publishes its state" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("repeats", [False, True])
+def test_a_part_that_does_not_stop_is_named(robot: Robot, endpoint: str, capsys: pytest.CaptureFixture[str], repeats: bool) -> None:
+    robot.repeats = repeats
     robot.deaf.add("torso")
     assert main(["estop", "--endpoint", endpoint]) == 1
     assert "torso did not stop" in capsys.readouterr().err
@@ -116,21 +169,8 @@ def test_robot_sim_confirms_a_stop_although_no_router_answers(
     endpoint: str, free_port: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(estop, "_CONNECT_PATIENCE", 0.1)
-    over, datagrams, reasons = threading.Event(), StopDatagrams(f"127.0.0.1:{free_port}"), set[str]()
-
-    def obey() -> None:
-        while not over.wait(0.01):
-            reasons.update(stop.reason for stop in datagrams.take())
-            datagrams.confirm()
-
-    thread = threading.Thread(target=obey)
-    thread.start()
-    try:
+    with confirming(free_port) as reasons:
         assert main(["estop", "--endpoint", endpoint, "--reason", "smoke"]) == 3
-    finally:
-        over.set()
-        thread.join()
-        datagrams.close()
     assert reasons == {"smoke"}
     assert "robot_sim confirms the stop." in capsys.readouterr().err
 

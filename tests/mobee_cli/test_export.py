@@ -135,3 +135,20 @@ def test_a_run_without_reaches_has_no_table_of_them(run: Path, capsys: pytest.Ca
     assert main(["export", str(run), "--reaches"]) == 2
     assert "no agent has learned to reach" in capsys.readouterr().err
     assert not (run / "reaches.csv").exists()
+
+
+def test_a_table_never_replaces_the_data_it_is_made_of(run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    store = run / STORE
+    (tmp_path / "named.db").write_bytes(store.read_bytes())
+    before = store.read_bytes()
+    for words in (
+        [str(run), "--csv", str(store)],
+        [str(store), "--csv", str(store)],
+        [str(store), "--parquet", str(store)],
+        [str(run), "--reaches", str(store)],
+        [str(run), "--csv", str(run / "cells" / "curious-s4.npz")],
+        [str(tmp_path / "named.db"), "--csv", str(tmp_path / "named.db")],
+    ):
+        assert main(["export", *words]) == 2
+        assert "must not replace the data of a run" in capsys.readouterr().err
+    assert store.read_bytes() == before == (tmp_path / "named.db").read_bytes()

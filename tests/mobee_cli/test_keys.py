@@ -49,7 +49,7 @@ def test_new_keys_hold_an_identity_for_each_service_of_the_shipped_scenarios(tmp
         (["new", "{folder}"], 3, "holds files already"),
         (["new", "{folder}/x", "--days", "0"], 2, "give 1 to 3650 days"),
         (["add", "--keys", "{folder}", "model", "--as", "client"], 2, "model is the name of a service"),
-        (["add", "--keys", "{folder}", "a b"], 3, "cannot name an identity"),
+        (["add", "--keys", "{folder}", "a b"], 2, "cannot name an identity"),
         (["list", "--keys", "{folder}/none"], 3, "`mobee keys new` makes a folder of keys"),
     ],
 )
@@ -64,3 +64,14 @@ def test_mistakes_are_said_in_one_line(
     assert printed.out == ""
     assert said in printed.err
     assert printed.err.count("\n") == 1
+
+
+def test_a_wrong_name_makes_and_renews_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = tmp_path / "keys"
+    assert main(["keys", "new", str(folder), "--parts", "torso", "left-arm"]) == 2
+    assert "'agent_left-arm' cannot name an identity" in capsys.readouterr().err
+    assert not folder.exists()
+    assert main(["keys", "new", str(folder), "--parts", "torso", "left_arm"]) == 0
+    before = {path: path.read_bytes() for path in folder.iterdir()}
+    assert main(["keys", "add", "--keys", str(folder), "model", "a/b"]) == 2
+    assert {path: path.read_bytes() for path in folder.iterdir()} == before

@@ -79,3 +79,64 @@ def test_a_file_of_other_settings_is_not_continued(arm: Path, capsys: pytest.Cap
     assert learned(arm, "--transitions", "3") == 0
     assert learned(arm, "--transitions", "6", "--explorer", "random") == 2
     assert 'has explorer = "curious" on record, now "random"' in capsys.readouterr().err
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file() and not path.name.endswith("-lock")}
+
+
+@pytest.mark.parametrize(
+    "options", [["--explorer", "random"], ["--seed", "1"], ["--seed", "-1"], ["--robot", "katana", "--part", "arm_2=arm_0"]]
+)
+def test_a_refused_command_leaves_the_files_of_the_store_as_they_are(
+    arm: Path, options: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert learned(arm, "--transitions", "3") == 0
+    capsys.readouterr()
+    before = contents(arm.parent)
+    assert learned(arm, "--transitions", "6", *options) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert contents(arm.parent) == before
+
+
+@pytest.mark.parametrize("robot", ["icub", "katana"])
+@pytest.mark.parametrize("options", [["--seed", "-1"], ["--explorer", "curios"]])
+def test_a_refused_command_makes_no_files(tmp_path: Path, robot: str, options: list[str]) -> None:
+    assert main(["learn", "--robot", robot, "--transitions", "3", "--store", str(tmp_path / "new" / "out.sqlite"), *options]) == 2
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_store_that_is_no_database_gets_no_scenario_beside_it(arm: Path) -> None:
+    arm.with_name("out.sqlite").write_text("mine " * 1000)
+    before = contents(arm.parent)
+    assert learned(arm, "--transitions", "3") == 2
+    assert contents(arm.parent) == before
+
+
+def test_the_transitions_of_two_robots_are_not_mixed(arm: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert learned(arm, "--transitions", "3") == 0
+    before = contents(arm.parent)
+    assert learned(arm, "--transitions", "6", "--robot", "icub", "--part", "head=neck_yaw,neck_pitch") == 2
+    assert "has transitions of robot 'Tiny Arm', not 'icub'" in capsys.readouterr().err
+    assert contents(arm.parent) == before
+
+
+@pytest.mark.parametrize("name", ["out.xml", "out.toml"])
+def test_a_file_that_it_has_not_written_is_not_replaced(arm: Path, name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    arm.with_name(name).write_text("mine")
+    assert learned(arm, "--transitions", "3") == 2
+    assert f"{name} exists and would be replaced" in capsys.readouterr().err
+    assert contents(arm.parent) == {"arm.urdf": ARM.encode(), name: b"mine"}
+
+
+def test_the_robot_file_that_it_reads_is_not_replaced(arm: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert learned(arm, "--transitions", "3") == 0
+    before = contents(arm.parent)
+    assert learned(arm, "--transitions", "6", "--robot", str(arm.with_name("out.xml"))) == 2
+    assert "would replace this file: give --store another name" in capsys.readouterr().err
+    assert contents(arm.parent) == before
+
+
+def test_a_store_in_a_new_folder_is_made(arm: Path) -> None:
+    assert learned(arm, "--transitions", "3", "--store", str(arm.parent / "new" / "out.sqlite")) == 0
+    assert {"out.sqlite", "out.toml", "out.xml"} <= contents(arm.parent / "new").keys()

@@ -73,6 +73,25 @@ def test_with_nothing_running_it_says_how_to_start(verb: list[str], free_port: i
     assert len(said.splitlines()) == 1
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
+@pytest.mark.parametrize("words", [["robots"], ["--help"]])
+def test_output_that_cannot_be_written_is_said_in_one_line(words: list[str]) -> None:
+    with open("/dev/full", "w") as full:
+        done = subprocess.run([sys.executable, "-m", "mobee_cli", *words], stdout=full, stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 3
+    assert done.stderr == f"mobee {words[0]}: a file or the output cannot be read or written (No space left on device)\n"
+
+
+def test_an_error_of_the_system_is_said_in_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    def run(_: Any) -> int:
+        print("the result")
+        raise PermissionError(13, "Permission denied", "a.png")
+
+    monkeypatch.setattr(robots, "run", run)
+    assert main(["robots"]) == 3
+    assert capsys.readouterr() == ("the result\n", "mobee robots: a.png cannot be read or written (Permission denied)\n")
+
+
 def interrupt(*_: Any, **__: Any) -> NoReturn:
     raise KeyboardInterrupt
 

@@ -41,12 +41,73 @@ def test_saved_files_are_not_overwritten(tmp_path: Path, capsys: pytest.CaptureF
     arm, folder = tmp_path / "arm.urdf", tmp_path / "mine"
     arm.write_text(ARM)
     assert main(["play", str(arm), "--offline-only", "--transitions", "4", "--save", str(folder)]) == 0
+    assert "Tiny Arm: 2 motors in 1 part, 2 shapes\n" in capsys.readouterr().out
     saved = ["README.md", "tiny_arm.sqlite", "tiny_arm.sqlite-lock", "tiny_arm.toml", "tiny_arm.xml"]
     assert sorted(path.name for path in folder.iterdir()) == saved
     assert "mobee check tiny_arm.xml" in (folder / "README.md").read_text()
     capsys.readouterr()
     assert main(["play", str(arm), "--offline-only", "--transitions", "4", "--save", str(folder)]) == 2
     assert "tiny_arm.toml exists: run it with `mobee launch" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["README.md", "tiny_arm.xml", "tiny_arm.sqlite"])
+@pytest.mark.parametrize("options", [["--set", "foo=1"], ["--offline-only", "--transitions", "4"]])
+def test_no_file_of_the_user_is_replaced_or_removed(
+    name: str, options: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arm, mine = tmp_path / "arm.urdf", tmp_path / "mine" / name
+    arm.write_text(ARM)
+    mine.parent.mkdir()
+    mine.write_text("mine")
+    assert main(["play", str(arm), "--save", str(mine.parent), *options]) == 2
+    assert f"{name} exists and would be replaced" in capsys.readouterr().err
+    assert [path.name for path in mine.parent.iterdir()] == [name] and mine.read_text() == "mine"
+
+
+@pytest.mark.parametrize("options", [["--explorer", "curios"], ["--seed", "-1"], ["--set", "foo=1"]])
+def test_a_refused_command_leaves_no_files(options: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arm, folder = tmp_path / "arm.urdf", tmp_path / "mine"
+    arm.write_text(ARM)
+    offline = [] if "--set" in options else ["--offline-only"]
+    assert main(["play", str(arm), "--save", str(folder), *offline, *options]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert not folder.exists()
+
+
+def test_a_robot_with_a_long_name_is_saved(tmp_path: Path) -> None:
+    arm = tmp_path / "arm.urdf"
+    arm.write_text(ARM.replace("Tiny Arm", "a" * 300))
+    assert main(["play", str(arm), "--offline-only", "--transitions", "4", "--runs", str(tmp_path / "runs")]) == 0
+    (saved,) = (tmp_path / "runs").glob("*/*.toml")
+    assert saved.stem == "a" * 64
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        ["katana"],
+        ["--offline-only"],
+        ["--part", "arm=shoulder"],
+        ["--seed", "0"],
+        ["--explorer", "curious"],
+        ["--world", "table"],
+        ["--field", "0.03"],
+        ["--seconds", "3"],
+        ["--transitions", "3"],
+        ["--save", "folder"],
+    ],
+)
+def test_options_of_a_new_setup_are_refused_with_a_learned_one(
+    given: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("mobee_cli.play.launch", lambda options: 0)
+    store = tmp_path / "out.sqlite"
+    store.touch()
+    store.with_suffix(".toml").touch()
+    assert main(["play", "--learned", str(store), "--camera", "hand"]) == 0
+    assert main(["play", *given, "--learned", str(store)]) == 2
+    said = capsys.readouterr().err
+    assert f"{given[0]}" in said and "not valid with --learned" in said and said.count("\n") == 1
 
 
 def test_a_port_in_use_is_said_before_it_learns(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -14,6 +15,7 @@ from hypothesis import strategies as st
 from mobee.errors import MobeeError
 from mobee_cli.__main__ import main
 from mobee_cli.replaying.differences import OF_THE_RUN, compare_runs, difference
+from mobee_cli.replaying.into import replay_into
 from mobee_cli.replaying.ticks import SLACK, ticks
 from services.recorder.reader import Recording
 from tests.services.recorder.recordings import Writer, message
@@ -117,3 +119,21 @@ def test_a_recording_without_a_robot_has_no_ticks(tmp_path: Path) -> None:
     writer.files.close()
     with pytest.raises(MobeeError, match="no tick"):
         list(ticks(Recording(tmp_path)))
+
+
+@pytest.mark.parametrize(
+    ("first", "mode", "says"),
+    [
+        (7, "free", "was not in lockstep .* record one with `mobee launch lockstep`"),
+        (0, "free", "was not in lockstep"),
+        (7, "lock", "does not begin at tick 0"),
+    ],
+)
+def test_a_run_that_cannot_be_played_into_a_service_is_refused_with_the_reason(first: int, mode: str, says: str, tmp_path: Path) -> None:
+    writer = Writer(tmp_path)
+    for k in range(first, first + 40):
+        writer.tick(k, mode=mode)
+    writer.files.close()
+    stage: Any = SimpleNamespace(who="controller")
+    with pytest.raises(MobeeError, match=says):
+        replay_into(stage, ticks(Recording(tmp_path)), 10)

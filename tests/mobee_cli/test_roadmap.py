@@ -168,6 +168,11 @@ def test_a_remaining_error_beyond_the_tolerance_is_no_arrival(say: Say, free: Pa
         (["show", "{map}", "--marker", "palm"], "unknown marker 'palm'"),
         (["show", "{map}", "--picture", "/nowhere/a.png"], "there is no folder /nowhere"),
         (["show", "{map}", "--robot", "icub_2014"], "made for robot"),
+        (["query", "{map}", "--to", "0", "0", "--from", "nan", "0.1"], "'nan' is not a finite number"),
+        (["play", "{map}", "--to", "inf", "0"], "'inf' is not a finite number"),
+        (["play", "{map}", "--to", "0", "0", "--seed", "-1"], "must be a whole number, 0 or more"),
+        (["build", "palm-down", "-o", "{map}.new.npz", "--seed", "-1"], "must be a whole number, 0 or more"),
+        (["build", "palm-down", "--longest", "-1"], "--longest -1: must be above 0, or 0 for no limit"),
         (["build", "palm-dwn"], "Did you mean 'palm-down'?"),
         (["build", "no.py"], "there is no such file"),
         (["build", "palm-down", "-o", "/nowhere/a.npz"], "there is no folder /nowhere"),
@@ -177,6 +182,26 @@ def test_invalid_input_is_refused_in_one_line(say: Say, free: Path, words: list[
     code, out, err = say(*(word.replace("{map}", str(free)) for word in words))
     assert code == 2 and out == ""
     assert text in err and err.count("\n") == 1
+
+
+@pytest.mark.parametrize("words", [["show", "--picture"], ["show", "--save"], ["play", "--to", "0", "0", "--picture"]])
+def test_a_folder_cannot_be_written_as_a_file(say: Say, free: Path, words: list[str], tmp_path: Path) -> None:
+    folder = tmp_path / ("a.rrd" if words[-1] == "--save" else "a.png")
+    folder.mkdir()
+    code, out, err = say(words[0], free, *words[1:], folder)
+    assert code == 2 and out == ""
+    assert f"{words[-1]} {folder}: cannot be written (Is a directory)" in err and err.count("\n") == 1
+
+
+def test_the_result_of_a_motion_is_printed_if_its_picture_cannot_be_drawn(
+    say: Say, free: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: Any) -> Path:
+        raise OSError(28, "No space left on device", "film.png")
+
+    monkeypatch.setattr("mobee.rendering.sheet.filmstrip", fail)
+    code, out, err = say("play", free, "--from", 0, 0, "--to", 0.4, 0.2, "--picture", tmp_path / "film.png")
+    assert code == 3 and out.startswith("Arrived at yaw 0.4") and "film.png cannot be read or written" in err
 
 
 def test_live_the_ball_may_have_moved_but_not_the_table(free: Path) -> None:

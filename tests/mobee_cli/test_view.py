@@ -71,3 +71,19 @@ def test_the_fields_grown_around_a_urdf_are_shown(tmp_path: Path) -> None:
     saved = tmp_path / "toy.rrd"
     assert main(["view", str(arm_with(tmp_path, '<sphere radius="0.1"/>')), "--field", "0.03", "--save", str(saved)]) == 0
     assert b"palm_field" in saved.read_bytes()
+
+
+def test_a_recording_that_cannot_be_written_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "folder.rrd").mkdir()
+    for path in (tmp_path / "folder.rrd", Path("/proc/x.rrd")):
+        assert main(["view", "katana", "--save", str(path)]) == 2
+        said = capsys.readouterr().err
+        assert f"--save {path}: cannot be written (" in said and said.count("\n") == 1
+
+
+def test_a_refused_robot_leaves_no_recording(tmp_path: Path) -> None:
+    old = tmp_path / "old.rrd"
+    old.write_text("old")
+    for name in ("new.rrd", "old.rrd"):
+        assert main(["view", "icubb", "--save", str(tmp_path / name)]) == 2
+    assert list(tmp_path.iterdir()) == [old] and old.read_text() == "old"

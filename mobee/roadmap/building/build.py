@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mobee.arrays import Array
+from mobee.arrays import Array, checked_seed
 from mobee.errors import InvalidValue, UnknownName
 from mobee.model.model import Model
 from mobee.roadmap.building.checkpoint import Checkpoint, Progress, request
@@ -105,6 +105,7 @@ def build_roadmap(
         InvalidValue, UnknownName: an argument is not valid; the message states the valid values.
         MobeeError: no first pose was found, the file has other settings or cannot be written, or the world has changed.
     """
+    checked_seed(seed)
     problem = Problem(model, _with_contacts(costs), start, motors, settings.margin)
     distances = _checked_spacing(task, spacing)
     # The names in a file: "front" is what SearchSettings was called in the first version of the format.

@@ -6,6 +6,7 @@ import re
 import warnings
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -132,6 +133,14 @@ def test_the_same_seed_derives_the_same_robot(tmp_path: Path) -> None:
     one, other = derive(robot, seed=3), derive(robot, seed=3)
     assert one.arms == other.arms and (one.robot.home == other.robot.home).all()
     assert np.array_equal(one.robot.field_pairs, other.robot.field_pairs)
+
+
+def test_a_seed_that_is_no_whole_number_of_at_least_0_is_refused(tmp_path: Path) -> None:
+    robot = urdf(tmp_path, limb("left_shoulder", 0.0, 0.3, 0.2))
+    wrong: tuple[Any, ...] = (-1, 1.5, True)
+    for seed in wrong:
+        with pytest.raises(InvalidValue, match="must be a whole number, 0 or more"):
+            derive(robot, seed=seed)
 
 
 def test_requested_joints_make_the_part(tmp_path: Path) -> None:

@@ -127,6 +127,13 @@ def test_a_finished_map_is_not_built_again(model: mobee.Model, whole: mobee.Road
     assert again.settings["finished"] is True
 
 
+@pytest.mark.parametrize("seed", [-1, 1.5, True])
+def test_a_seed_that_is_no_whole_number_of_at_least_0_is_refused(seed: Any, model: mobee.Model, tmp_path: Path) -> None:
+    with pytest.raises(mobee.InvalidValue, match="must be a whole number, 0 or more"):
+        _build(model, seed=seed, file=tmp_path / "map.npz")
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.parametrize(
     ("others", "name"),
     [
