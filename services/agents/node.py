@@ -30,6 +30,8 @@ from services.common.hands import hand_of
 from services.common.rate import NOT_MEASURED
 from services.common.service import CallRefused, Service
 
+PRESENT_PERIOD = 1.0  # s between attempts to present a target that the model does not accept
+
 
 class Work:
     """The main loop of an agent's process.
@@ -184,7 +186,7 @@ class ReachNode:
     def __init__(self, service: Service, config: Config, robot: Robot) -> None:
         self._config = config
         self._targets = [ReachTarget(np.array(place), config.target_radius) for place in config.targets]
-        plant = BusPlant(service, robot, (config.part,))
+        self._plant = plant = BusPlant(service, robot, (config.part,))
         known = load_learned(Path(config.learned) / STORE, config.part, robot) if config.learned else None
         self._wait = wait = StoreWait(service)
         store = wait.until_accepted(lambda: ReachStore(Path(config.run_dir) / STORE, config.part)) if config.run_dir else None
@@ -218,7 +220,7 @@ class ReachNode:
         else:
             target = agent.problems.targets[agent.under_way]
         agent.begin(target)
-        agent.plant.present(target)
+        self._present(target)
         while agent.under_way is not None:
             plan = agent.planned()
             self._stream.put(agent.step(), target, plan)
@@ -230,6 +232,14 @@ class ReachNode:
         self._reached += made.reach_state is not None
         self._rewards += made.reward
         self._missing += made.missing
+
+    def _present(self, target: ReachTarget) -> None:
+        """Present a target; raise ActionInterrupted after a wait if the model does not answer, or another service presents a target."""
+        try:
+            self._plant.present(target)
+        except ActionInterrupted:
+            self._plant.pause(PRESENT_PERIOD)  # the next attempt follows at once
+            raise
 
     def _mark(self) -> None:
         self._made = self._failures = self._reached = self._work.interrupted = 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import time
 import uuid
+from collections import deque
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 
@@ -36,7 +37,9 @@ class BusFollower(BusPlant):
 
     def __init__(self, service: Service, robot: Robot) -> None:
         super().__init__(service, robot, tuple(robot.parts))
-        self._seen: list[tuple[float, Array]] = []  # s of the robot's clock, encoders (n,)
+        self._seen: deque[tuple[float, Array]] = deque()  # s of the robot's clock, encoders (n,); of the last two windows
+        self._followed: list[tuple[float, Array]] = []  # the same since `follow` began
+        self._is_following = False
         service.on_newest(Tick, self._note_tick)
 
     @property
@@ -96,7 +99,8 @@ class BusFollower(BusPlant):
         (REST_TIMEOUT) after the last row. Call `let_go` afterwards.
         """
         begun, run, last = self._now, self._runs, len(attractors) - 1
-        self._seen.clear()
+        self._followed.clear()
+        self._is_following = True
         asked: dict[str, Sent] = {}
         row, before = 0, None
         while True:
@@ -116,15 +120,19 @@ class BusFollower(BusPlant):
         return {part: self._outcome(part, one) for part, one in asked.items()}
 
     def seen(self) -> tuple[Array, Array]:
-        """Return the encoder values (T, n) rad of all ticks since `follow` began, and the times (T,) s of these ticks since the first."""
-        times = np.array([time_ for time_, _ in self._seen])
-        return times - times[:1], np.array([q for _, q in self._seen])
+        """Return the times (T,) s of all ticks since `follow` began, from the first of them on, and the encoder values (T, n) rad.
+
+        The ticks after `let_go` are not among them.
+        """
+        times = np.array([time_ for time_, _ in self._followed])
+        return times - times[:1], np.array([q for _, q in self._followed])
 
     def let_go(self) -> None:
         """Release the goals of all taken parts (the right to set their attractors); the parts then stay where they are.
 
         A goal that this service no longer owns is ignored.
         """
+        self._is_following = False
         for part in list(self._epochs):
             with suppress(CallFailed):  # lost already, or there is no controller: then the part holds
                 self.release(part)
@@ -160,7 +168,12 @@ class BusFollower(BusPlant):
             self._wait(lambda: enough() or not self._has(parts))
 
     def _note_tick(self, tick: Tick) -> None:
-        self._seen.append((tick.t * 1e-9, np.array(tick.q)))
+        now = tick.t * 1e-9
+        while self._seen and not now - 2.0 * WINDOW < self._seen[0][0] <= now:  # too old, or of the run before
+            self._seen.popleft()
+        self._seen.append((now, np.array(tick.q)))
+        if self._is_following:
+            self._followed.append(self._seen[-1])
 
     def _is_commanded_to_rest(self, part: str, settle: Settle) -> bool:
         motion = self._motion.get(part)

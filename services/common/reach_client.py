@@ -39,8 +39,8 @@ class ReachClient:
     def present(self, target: ReachTarget | None) -> None:
         """Put a target into the model's world as the object `reach_target`, or move it there; None removes it.
 
-        Implements `mobee.reach.ReachPlant.present`. Raises ActionInterrupted if the model does not answer, InvalidValue if it refuses the
-        target.
+        Implements `mobee.reach.ReachPlant.present`. Raises ActionInterrupted if the model does not answer, or if another service presents
+        a target; InvalidValue if the model refuses the target.
         """
         if target is not None:
             self._put(target)
@@ -156,6 +156,8 @@ class ReachClient:
         except CallFailed as error:
             if error.code == "no_answer":
                 raise ActionInterrupted(f"the model does not answer: {error}") from None
+            if error.code == "owned":
+                raise ActionInterrupted(str(error)) from None
             raise InvalidValue(str(error)) from None
 
     def _note_reach(self, part: str, reach: Reach) -> None:

@@ -77,20 +77,21 @@ class Drives:
         self._attempts.clear()
         self._stop_is_latched = False
 
-    def watch_stop(self, parts: Mapping[str, PartStatus]) -> None:
-        """Read emergency stops from the bus; after a stop no part is armed until the safety gates show that the stop was reset.
+    def watch_stop(self, parts: Mapping[str, PartStatus]) -> bool:
+        """Read emergency stops from the bus, and return whether one is in force or has arrived since the last call.
 
-        This method publishes the stop again every 0.1 s until robot_sim obeys it. It discards the stop when robot_sim has obeyed it and no
-        gate is in the state "estop" any more. `parts`: the newest status of each part.
+        After a stop no part is armed until the safety gates show that the stop was reset. This method publishes the stop again every 0.1 s
+        until robot_sim obeys it. It discards the stop when robot_sim has obeyed it and no gate is in the state "estop" any more. `parts`:
+        the newest status of each part, which shows nothing of a stop that began and was reset in a pause or while this process was frozen.
         """
-        now = time.monotonic()
-        for message in self._line.take():
+        now, arrived = time.monotonic(), self._line.take()
+        for message in arrived:
             if self._stop is None:  # it is left to robot_sim first: a repetition could come after its release
                 self._repeat_at = now + STOP_PERIOD
             self._stop = message
             self._stop_is_latched |= message.src == "robot_sim" and message.run == self._service.bus.run
         if self._stop is None:
-            return
+            return False
         if any(state.gate == "estop" for state in parts.values()):
             self._stop_is_latched = True
         elif self._stop_is_latched:
@@ -98,11 +99,7 @@ class Drives:
         elif now >= self._repeat_at:
             self._repeat_at = now + STOP_PERIOD
             self._stops.put(set=True, source=self._stop.source, reason=self._stop.reason)
-
-    @property
-    def is_stopped(self) -> bool:
-        """Whether the robot is in an emergency stop, as far as this controller knows."""
-        return self._stop is not None
+        return bool(arrived) or self._stop is not None
 
     def can_arm(self, state: PartStatus) -> bool:
         """Return whether this controller may now take and arm the drive of a part, the right to command the part's motors.

@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from bus_schema import keys
-from bus_schema.messages import Forces, Order, PartStatus, Targets, Tick
+from bus_schema.messages import Forces, Order, Targets, Tick
 from bus_schema.rpc import PartMeta
 from mobee import Gains
 from mobee.arrays import Array
@@ -108,8 +108,9 @@ class ControllerNode:
             return
         self._law.measure(np.array(tick.q))
         fresh = self._law.forces.are_fresh(tick.k)
-        self._supervise(tick, fresh)
-        orders, reference = self._control(tick, fresh) if tick.k > 0 else ({}, self._law.q)
+        is_stopped = self._drives.watch_stop(tick.parts)
+        self._supervise(tick, fresh, is_stopped)
+        orders, reference = self._control(tick, fresh, is_stopped) if tick.k > 0 else ({}, self._law.q)
         if tick.mode == "lock":
             self._motions.publish(tick)  # first: a service that gets its turn must know the state of its action
             self._commands.send_and_answer(tick, fresh, orders, reference)
@@ -118,29 +119,31 @@ class ControllerNode:
             self._motions.publish(tick)
             self._reaches.publish_regularly(tick)
 
-    def _supervise(self, tick: Tick, fresh: bool) -> None:
-        """Arm the parts that can be armed; a part that is not under control has no action and rests where it is."""
-        self._drives.watch_stop(tick.parts)
+    def _supervise(self, tick: Tick, fresh: bool, is_stopped: bool) -> None:
+        """Arm the parts that can be armed; a part that is not under control has no action and rests where it is.
+
+        In the tick in which the controller learns of an emergency stop (`is_stopped`), no part is under control, although its status may
+        be older than the stop.
+        """
         for part, action in self._actions.items():
             state = tick.parts[part]
             lacking = "no fresh forces" if not fresh else "no fresh state" if tick.t - state.t > MAX_STATE_AGE else ""
-            if lacking or not self._drives.is_armed(part, state):
-                if not lacking:
+            if is_stopped or lacking or not self._drives.is_armed(part, state):
+                if not is_stopped and not lacking:
                     self._drives.try_arm(part, state)
-                self._lose(part, tick, state, lacking or f"gate {state.gate}")
+                why = "emergency stop" if is_stopped else lacking or f"gate {state.gate}"
+                self._lose(part, tick, why, not is_stopped and action.may_continue(tick.t * 1e-9, state.gate))
                 self._law.rest(part)
                 self._counters.held_ticks += 1
             elif action.is_in_hold:
                 self._regain(part, tick)
 
-    def _lose(self, part: str, tick: Tick, state: PartStatus, why: str) -> None:
-        """Suspend the action of a part that is not under control if it may continue later, or else end it and hold the part.
+    def _lose(self, part: str, tick: Tick, why: str, may_continue: bool) -> None:
+        """Suspend the action of a part that is not under control, or end it and hold the part if the action must not continue later.
 
-        `Action.may_continue` decides, but no action continues after an emergency stop. A suspended action remains suspended as long as it
-        may continue. `why`: the reason, for the messages.
+        A suspended action remains suspended as long as it may continue. `why`: the reason, for the messages.
         """
         action = self._actions[part]
-        may_continue = action.may_continue(tick.t * 1e-9, state.gate) and not self._drives.is_stopped
         if may_continue and action.status == "moving":
             action.suspend(tick.k, tick.t * 1e-9)
             self._law.clear_client_forces(part)
@@ -160,26 +163,27 @@ class ControllerNode:
             self._law.seek_posture(part)
         action.resume(tick.k)
 
-    def _control(self, tick: Tick, fresh: bool) -> tuple[dict[str, Order], Array]:
+    def _control(self, tick: Tick, fresh: bool, is_stopped: bool) -> tuple[dict[str, Order], Array]:
         """Return the orders to the parts, and their reference (n,).
 
-        Without fresh forces, every part that follows commands is ordered to hold (to brake and stand still).
+        Without fresh forces, and in an emergency stop, every part that follows commands is ordered to hold (to brake and stand still).
         """
         ticks = self._law.count_ticks(tick.k)
         self._counters.ticks += 1
         self._counters.long_gaps += ticks > MAX_TICKS
         if not self._service.locked:  # in lockstep ticks have no period
             self._counters.note_step(ticks * tick.dt / 1e9 / tick.rate)
+        followers = [part for part, state in tick.parts.items() if (is_stopped or not fresh) and self._drives.is_armed(part, state)]
+        holds = {part: Order(self._drives.epochs[part], "hold") for part in followers}
         if not fresh:
-            followers = (part for part, state in tick.parts.items() if self._drives.is_armed(part, state))
-            return {part: Order(self._drives.epochs[part], "hold") for part in followers}, self._law.q
+            return holds, self._law.q
         reference = self._law.step(tick, min(ticks, MAX_TICKS))
         speeds = {part: self._law.settle_speeds(part) for part in self._actions}
         moving = {part: action for part, action in self._actions.items() if not action.is_in_hold}
         for part, action in moving.items():
             action.update(tick.k, tick.t * 1e-9, *speeds[part], partial(self._law.is_approaching, part))
             self._reaches.update(part, tick)
-        return {part: Order(self._drives.epochs[part], self._config.modality) for part in moving}, reference
+        return holds or {part: Order(self._drives.epochs[part], self._config.modality) for part in moving}, reference
 
     def _hold(self, part: str, k: int, why: str) -> None:
         self._actions[part].hold(k)

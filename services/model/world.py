@@ -42,8 +42,7 @@ class WorldServer:
         self._service, self._model, self._sigmas, self._ghosts = service, model, sigmas, frozenset(ghosts)
         self.latency = Percentiles()  # ms from the picture that shows an object to its place in the world
         self.pose = model.evaluate(model.robot.home)  # the newest, for objects attached to a link
-        self._perceived: set[str] = set()  # objects that vision added: it changes no other
-        self._expiry: dict[str, int] = {}  # of those that vanish when they are not seen again, ns of the bus clock
+        self._expiry: dict[str, int] = {}  # ns of the bus clock, of the objects that vision added: it changes no other
         self._margins: dict[str, float] = {}  # m, of perceived objects
         self._roles: dict[str, Role] = {}  # of perceived objects, that clients have set
         self._captured: dict[str, int] = {}  # ns, time of the newest picture of each perceived object, stale ones too
@@ -59,8 +58,11 @@ class WorldServer:
         service.on_request(keys.world_rpc("list"), Empty, lambda r, _: self._list())
 
     def expire(self, t: int) -> None:
-        """Remove the perceived objects whose time of validity is over; `t`: present time, ns of the bus clock."""
-        for name in [name for name, until in self._expiry.items() if until < t]:
+        """Remove the perceived objects whose time of validity is over; `t`: present time, ns of the bus clock.
+
+        An object that is attached to a link stays until it is detached, since a hand may hide it from the eyes.
+        """
+        for name in [name for name, until in self._expiry.items() if until < t and not self._is_attached(name)]:
             self._expire(name, "it was not seen again in time")
 
     def positions(self, names: Collection[str]) -> dict[str, list[float]]:
@@ -77,15 +79,18 @@ class WorldServer:
     def _perceive(self, seen: WorldObject) -> None:
         world = self._model.world
         is_new = seen.name not in world.objects
-        if not is_new and seen.name not in self._perceived:
+        if not is_new and seen.name not in self._expiry:
             self._service.bus.reject(
                 "authority", f"{seen.src} sees {seen.name!r}, which the scenario or a client placed: it stays as it is"
             )
             return
+        if not is_new and self._is_attached(seen.name):  # its place follows from the link
+            self._expiry[seen.name], self._captured[seen.name] = seen.valid_until, seen.t_capture
+            return
         margin = self._margin(seen)
         if seen.valid_until < self._service.bus.t or margin > MOST_MARGIN:
             self._captured[seen.name] = seen.t_capture
-            if seen.name in self._expiry:
+            if not is_new:
                 self._expire(seen.name, "vision withdrew it" if margin <= MOST_MARGIN else "its place has become too uncertain")
             return
         try:
@@ -93,12 +98,13 @@ class WorldServer:
         except MobeeError as error:
             self._service.bus.reject("world", str(error))
             return
-        self._perceived.add(seen.name)
         if seen.t_capture > self._captured.get(seen.name, -1):
             self.latency.add(1e-6 * (self._service.bus.now() - seen.t_capture))
         self._margins[seen.name], self._captured[seen.name] = margin, seen.t_capture
-        if is_new or seen.name in self._expiry:
-            self._expiry[seen.name] = seen.valid_until
+        self._expiry[seen.name] = seen.valid_until
+
+    def _is_attached(self, name: str) -> bool:
+        return self._model.world.objects[name].link is not None
 
     def _margin(self, seen: WorldObject) -> float:
         """Return the distance [m] by which a perceived shape is enlarged for its position uncertainty.
@@ -125,19 +131,19 @@ class WorldServer:
         if request.name == TARGET:
             self._require_presenter(request.who)
         self._put(world, request)
-        self._perceived.discard(request.name)  # the client that added it removes it
-        self._expiry.pop(request.name, None)
+        self._forget(request.name)  # the client that added it removes it
 
     def _require_presenter(self, who: str) -> None:
         """Refuse a second service that presents a target (object to reach for), since both would move the same object.
 
-        Raises InvalidValue, with which the call of `who` is refused, if another running service presents it; else `who` now presents it.
+        Raises CallRefused if another running service presents it; else `who` now presents it.
         """
         other = self._presenter
         if TARGET in self._model.world.objects and other != who and self._service.alive.get(other):
-            raise InvalidValue(
+            raise CallRefused(
+                "owned",
                 f"{other} presents {TARGET!r}, and only one service at a time can: {who} can after {other} has ended. "
-                "A scenario can have one agent with targets."
+                "A scenario can have one agent with targets.",
             )
         self._presenter = who
 
@@ -150,7 +156,6 @@ class WorldServer:
     def _attach(self, world: World, request: Attach) -> None:
         world.follow(self.pose)
         world.attach(request.name, request.link)
-        self._expiry.pop(request.name, None)  # an object in a hand may be hidden from the eyes
 
     def _detach(self, world: World, name: str) -> None:
         world.follow(self.pose)
@@ -159,19 +164,21 @@ class WorldServer:
     def _set_role(self, world: World, request: SetRole) -> None:
         """Set the role of an object.
 
-        If vision perceives the object, the role is also stored until the object is removed, since every new message of vision would reset
-        it.
+        If vision perceives the object, the role is also stored until the object is removed or a client adds it, since every new message of
+        vision would reset it.
         """
         world.set_role(request.name, request.role)
-        if request.name in self._perceived:
+        if request.name in self._expiry:
             self._roles[request.name] = request.role
 
     def _remove(self, world: World, name: str) -> None:
         world.remove(name)
-        self._roles.pop(name, None)
-        self._perceived.discard(name)
-        self._expiry.pop(name, None)
-        self._margins.pop(name, None)
+        self._forget(name)
+
+    def _forget(self, name: str) -> None:
+        """Forget that vision perceived an object."""
+        for known in (self._expiry, self._margins, self._roles):
+            known.pop(name, None)
 
     def _put(self, world: World, seen: WorldObject | AddObject, margin: float = 0.0) -> None:
         known = world.objects.get(seen.name)
@@ -189,9 +196,10 @@ class WorldServer:
         world.add(seen.name, shape, position=seen.position, rotation=rotation, role=role)
 
     def _role_of(self, seen: WorldObject | AddObject) -> Role:
-        """Return the role of an object: as a client has set it, or that of the settings if vision perceives it, or as it was sent."""
-        as_sent: Role = "ghost" if seen.name in self._ghosts and isinstance(seen, WorldObject) else seen.role
-        return self._roles.get(seen.name, as_sent)
+        """Return the role of an object: as it was sent; if vision perceives it, first that which a client or the settings have set."""
+        if isinstance(seen, AddObject):
+            return seen.role
+        return self._roles.get(seen.name, "ghost" if seen.name in self._ghosts else seen.role)
 
     def _move(self, world: World, request: MoveObject) -> None:
         rotation = None if request.quaternion is None else _rotation(request.quaternion)
@@ -207,7 +215,7 @@ class WorldServer:
 
     def _state(self, thing: Thing) -> ObjectState:
         found = object_state(self._in_root_frame(thing), thing.link or "")
-        if thing.name not in self._perceived:
+        if thing.name not in self._expiry:
             return found
         return replace(found, margin=self._margins.get(thing.name, 0.0), t_capture=self._captured.get(thing.name))
 

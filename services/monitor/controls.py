@@ -51,6 +51,7 @@ TRIES = 3
 FREE_PATIENCE = 4.0  # s until a part that was taken can move
 STOP_PATIENCE, STOP_PERIOD = 2.0, 0.1  # s for which an emergency stop is repeated until all parts report it
 STOP_CHECK = 0.01  # s between two checks for that report
+SILENCE = 0.5  # s without any state of a part, as in a pause, after which the confirmation by robot_sim is sufficient
 AFTER_REACH = 4.0  # s for which the hand stays after a reach, before the part is given back
 PLACE_RADIUS = 0.03  # m, of the sphere that is presented at a place
 UPRIGHT = [1.0, 0.0, 0.0, 0.0]
@@ -62,11 +63,14 @@ class Known:
     """The newest messages that the commands of the monitor's web page depend on. The main thread writes them; other threads read them.
 
     `gates`: state of robot_sim's safety gate (check of commands), by part. `stopped`: monotonic time [s] at which all parts last reported
-    an emergency stop. `motions`, `reaches`: the newest message, by part. `objects`: objects of the world of the service `model`, by name.
+    an emergency stop; `confirmed`: at which robot_sim last reported it; `heard`: at which the newest state of a part came. `motions`,
+    `reaches`: the newest message, by part. `objects`: objects of the world of the service `model`, by name.
     """
 
     gates: dict[str, str] = field(default_factory=dict)
     stopped: float = 0.0
+    confirmed: float = 0.0
+    heard: float = 0.0
     motions: dict[str, Motion] = field(default_factory=dict)
     reaches: dict[str, Reach] = field(default_factory=dict)
     objects: dict[str, ObjectState] = field(default_factory=dict)
@@ -98,6 +102,7 @@ class PageControls:
         self._lock = RLock()
         self._holder, self._pages = "", 0
         self._taken: dict[str, _Taken] = {}
+        self._presented = ""  # part for which this service presents a target of its own
         self._released = 0.0  # s, monotonic clock: when a page last released an emergency stop
         self._estop = service.bus.publisher(EStop)
         self._verbs: Mapping[str, Callable[[dict[str, Any]], str]] = {
@@ -191,6 +196,8 @@ class PageControls:
                 time.sleep(STOP_CHECK)
                 if self._known.stopped > begin:  # never again after that: a release may follow at once
                     return "Stopped: all motors."
+                if (sender.is_confirmed() or self._known.confirmed > begin) and now > max(begin, self._known.heard) + SILENCE:
+                    return "Stopped: all motors, as robot_sim confirms."
                 if self._released > begin:
                     raise Refused("a page released the robot before all parts confirmed the stop: press S to stop it again")
         raise Refused(f"the stop was sent for {STOP_PATIENCE:g} s, and not every part confirms it: use the robot's own emergency button")
@@ -216,7 +223,8 @@ class PageControls:
     def _explore(self, given: dict[str, Any]) -> str:
         """Change the explorer of the agent of a part, or of all agents."""
         explorer = str(given["explorer"])
-        running = [name for name in self._service.alive if name.startswith("agent_")]
+        alive = self._service.alive.copy()  # the main thread changes it
+        running = [name for name, instances in alive.items() if instances and name.startswith("agent_")]
         agents = [f"agent_{self._part(given)}"] if given.get("part") else running
         if not agents:
             raise Refused("no agent runs")
@@ -264,23 +272,34 @@ class PageControls:
         part = part_of(self._robot, hand)
         taken = self._take(part)
         if name is None:
-            sphere = Geometry(kind="sphere", size=[radius])
-            if TARGET in self._known.objects:
-                with suppress(CallFailed):  # removed already; if the model does not answer, the call below fails
-                    self._call(keys.world_rpc("remove"), OneName, Done, name=TARGET)
-            self._call(
-                keys.world_rpc("add"),
-                AddObject,
-                Done,
-                name=TARGET,
-                geometry=sphere,
-                position=place.tolist(),
-                quaternion=UPRIGHT,
-                role="target",
-            )
+            self._present(part, place)
         asked = {"marker": hand, "object": name or TARGET, "position": place.tolist(), "radius": radius, "aim": "surface", "stay": True}
         taken.reach, taken.over_since = self._aim(part, "reach", ReachFor, **asked), None
         return f"The {title_of(hand)} reaches for {'it' if name is None else f'the {name}'}."
+
+    def _present(self, part: str, place: Array) -> None:
+        """Put a target for a part into the model's world, instead of the target of an agent that rests for a page.
+
+        Raises CallFailed if another service presents a target.
+        """
+        try:
+            self._add_target(place)
+        except CallFailed as failed:
+            presenter = str(failed).partition(" ")[0]  # the refusal begins with its name
+            if failed.code != "owned" or presenter not in {taken.agent for taken in self._taken.values()}:
+                raise
+            self._remove_target()
+            self._add_target(place)
+        self._presented = part
+
+    def _add_target(self, place: Array) -> None:
+        sphere, key = Geometry(kind="sphere", size=[PLACE_RADIUS]), keys.world_rpc("add")
+        position = place.tolist()
+        self._call(key, AddObject, Done, name=TARGET, geometry=sphere, position=position, quaternion=UPRIGHT, role="target")
+
+    def _remove_target(self) -> None:
+        with suppress(CallFailed):  # removed already
+            self._call(keys.world_rpc("remove"), OneName, Done, name=TARGET)
 
     def _place(self, given: dict[str, Any]) -> str:
         """Move an object of the simulator; an object that vision does not perceive is also moved in the model's world."""
@@ -331,9 +350,9 @@ class PageControls:
             return
         with suppress(CallFailed):  # lost already, or there is no controller
             self._call(keys.goal(part, "release"), WithEpoch, Done, epoch=taken.epoch)
-        if taken.reach and TARGET in self._known.objects:
-            with suppress(CallFailed):  # removed already
-                self._call(keys.world_rpc("remove"), OneName, Done, name=TARGET)
+        if part == self._presented:
+            self._remove_target()
+            self._presented = ""
         self._wake(taken.agent)
 
     def _wake(self, agent: str) -> None:

@@ -81,12 +81,14 @@ class MonitorNode:
         self._images = {name: bus.latest(Image, name) for name in config.cameras_on(robot)}
         self._touching: list[ContactItem] = []
         self._recorded: list[dict[str, Any]] = []  # contacts
+        self._has_trouble = False  # the record of the page cannot be written
         self._offset = self._last = 0.0  # s: runs are shown one after the other
         self._time = Percentiles()
         self._teller, self._known = Teller(robot, self._colors), Known()
         self._seen = Seen(patience=STALE + (config.patience if service.locked else 0.0))
         self._ticked: float | None = None  # monotonic clock
         self._stop: tuple[float, EStop] | None = None  # with the monotonic clock of the newest
+        self._newest = -1  # tick of the newest state of a part
         self._held_since: dict[str, float] = {}  # monotonic clock
         self._why_held: dict[str, str] = {}
         self._events: deque[dict[str, Any]] = deque(maxlen=SHOWN_EVENTS)
@@ -198,6 +200,9 @@ class MonitorNode:
         self._known.gates = {part: state.gate for part, state in self._body.states.items()}
         if self._known.gates and set(self._known.gates.values()) == {"estop"}:
             self._known.stopped = time.monotonic()
+        newest = max((state.k for state in self._body.states.values()), default=-1)
+        if newest != self._newest:
+            self._newest, self._known.heard = newest, time.monotonic()
 
     def _show_body(self) -> None:
         server = self._output.server
@@ -221,11 +226,20 @@ class MonitorNode:
         self._board.put("status", self._status())
         if self._output.record is not None:
             self._output.record.flush()
+            self._report(self._output.record.trouble)
+
+    def _report(self, trouble: str) -> None:
+        """Publish an event when the record of the page begins or ceases to lose values; `trouble`: the reason, empty if it loses none."""
+        if bool(trouble) != self._has_trouble:
+            level, text = ("warning", f"nothing of the page is recorded: {trouble}") if trouble else ("info", "the page is recorded again")
+            self._service.bus.event(level, "recording", text)
+        self._has_trouble = bool(trouble)
 
     def _status(self) -> dict[str, Any]:
         now, seen = time.monotonic(), self._seen
         seen.clock_age = None if self._ticked is None else now - self._ticked
-        seen.gates, seen.why_held, seen.services = self._known.gates, self._why_held, set(self._service.alive)
+        seen.gates, seen.why_held = self._known.gates, self._why_held
+        seen.services = {name for name, instances in self._service.alive.items() if instances}
         seen.known = {*seen.known, *seen.services}
         held = {part for part, motion in self._known.motions.items() if motion.status in ("held", "suspended")}
         self._held_since = {part: self._held_since.get(part, now) for part in held}
@@ -310,6 +324,8 @@ class MonitorNode:
 
     def _note_stop(self, stop: EStop) -> None:
         self._stop = (time.monotonic(), stop) if stop.set else None
+        if stop.set and stop.src == "robot_sim":
+            self._known.confirmed = time.monotonic()
 
     def _note_clock(self, clock: Clock) -> None:
         self._last = max(self._last, self._offset + 1e-9 * clock.t)

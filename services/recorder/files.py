@@ -6,6 +6,7 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
@@ -45,7 +46,10 @@ def _numbered(folder: Path) -> dict[int, Path]:
 
 
 class Files:
-    """Writes messages to the files of a recording. Its methods raise OSError if a file cannot be written."""
+    """Writes messages to the files of a recording. Its methods raise OSError if a file cannot be written.
+
+    The next message then begins a new file: what follows an incomplete record in a file cannot be read.
+    """
 
     def __init__(self, folder: Path, largest: int, settings: Mapping[str, bytes]) -> None:
         """Prepare the recording in a folder.
@@ -55,6 +59,7 @@ class Files:
         """
         self._folder, self._largest, self._settings = folder, largest, settings
         self._file: IO[bytes] | None = None
+        self._is_flushed = False  # at least once, the present file
         self._writer: Writer
         self._channels: dict[Channel, int] = {}
         self.begun = 0  # files
@@ -70,15 +75,19 @@ class Files:
         `data`: content of the message. `received`, `published`: times of receipt and of publication, ns since 1970. `sequence`: number that
         the sender gave to the message.
         """
-        if self._file is None:
-            self._begin()
-        number = self._channels.get(channel)
-        if number is None and len(self._channels) >= MOST_CHANNELS:
-            self._end_part()
-            self._begin()
-        if number is None:
-            number = self._channels[channel] = self._register(channel)
-        self._writer.add_message(number, received, data, published, sequence)
+        try:
+            if self._file is None:
+                self._begin()
+            number = self._channels.get(channel)
+            if number is None and len(self._channels) >= MOST_CHANNELS:
+                self._end_part()
+                self._begin()
+            if number is None:
+                number = self._channels[channel] = self._register(channel)
+            self._writer.add_message(number, received, data, published, sequence)
+        except OSError:
+            self._give_up()
+            raise
 
     def flush(self) -> None:
         """Hand all data to the operating system, so that they are kept even if this process is killed.
@@ -88,7 +97,12 @@ class Files:
         """
         if self._file is None:
             return
-        self._writer.flush()  # type: ignore[no-untyped-call]  # the package lacks the annotation
+        try:
+            self._writer.flush()  # type: ignore[no-untyped-call]  # the package lacks the annotation
+        except OSError:
+            self._give_up()
+            raise
+        self._is_flushed = True
         if self._file.tell() > self._largest / FILES:
             self._end_part()
 
@@ -98,21 +112,38 @@ class Files:
 
     def close(self) -> None:
         """Write the index of the present file, and close the file; nothing is done if no file is open."""
-        if self._file is not None:
-            file, self._file = self._file, None
-            with file:
-                self._writer.finish()  # type: ignore[no-untyped-call]  # as above
+        if self._file is None:
+            return
+        try:
+            self._writer.finish()  # type: ignore[no-untyped-call]  # as above
+            self._file.close()
+        except OSError:
+            self._give_up()
+            raise
+        self._file = None
+
+    def _give_up(self) -> None:
+        """Close the present file without an index, after a failed write; remove it if nothing in it can be read."""
+        if self._file is None:
+            return
+        file, self._file = self._file, None
+        with suppress(OSError):  # of the write that is tried again: the file is closed nevertheless
+            file.close()
+        if not self._is_flushed:
+            Path(file.name).unlink()
+            self.begun -= 1
 
     def _begin(self) -> None:
         number = 1 + max(_numbered(self._folder), default=-1)
         self._file = (self._folder / f"messages-{number:04}.mcap").open("xb")
+        self._is_flushed = False
+        self.begun += 1
         self._channels.clear()
         self._writer = Writer(self._file, chunk_size=_CHUNK, compression=CompressionType.ZSTD)
         self._writer.start(library="mobee")
         now = time.time_ns()
         for name, text in self._settings.items():
             self._writer.add_attachment(now, now, name, "application/toml", text)
-        self.begun += 1
 
     def _register(self, channel: Channel) -> int:
         schema = self._writer.register_schema(channel.schema, channel.schema_encoding, channel.definition) if channel.schema else 0

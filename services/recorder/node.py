@@ -149,7 +149,7 @@ class RecorderNode:
         self._receive_all()
         time.sleep(RECEIVING)
         try:
-            self._write(self._tap.drain())
+            self._write(self._arrived())
             self._files.close()
         except OSError as error:
             self._service.log.error("the end of the recording is not written: %s", error.strerror)
@@ -171,7 +171,7 @@ class RecorderNode:
         self._service.inbox.at(time.monotonic() + TIDY_PERIOD, self._tidy)
 
     def _record_arrived(self) -> None:
-        arrived, now = self._tap.drain(), time.monotonic()
+        arrived, now = self._arrived(), time.monotonic()
         if len(arrived) > FEW:  # otherwise it is woken seldom, and its connection must not seem dead if this thread is late
             receive_together(self._sockets, TOGETHER)
         if self._trouble and now < self._failed_at + RETRY_PERIOD:
@@ -180,7 +180,6 @@ class RecorderNode:
         try:
             self._require_space()
             self._write(arrived)
-            self._files.flush()
         except OSError as error:
             self._lost += len(arrived)
             self._fail(f"nothing is recorded: {error.strerror or error}")
@@ -200,14 +199,20 @@ class RecorderNode:
             self._service.bus.event("warning", "recording", trouble)
         self._trouble = trouble
 
-    def _write(self, arrived: list[Raw]) -> None:
+    def _arrived(self) -> list[tuple[Raw, int]]:
+        """Return the messages that have arrived, with their numbers.
+
+        The numbers are read from the messages that are dropped, too: else the next message would count these as lost once more.
+        """
+        return [(message, self._number_of(message)) for message in self._tap.drain()]
+
+    def _write(self, arrived: list[tuple[Raw, int]]) -> None:
         if self._tokens:
-            arrived = sorted([*self._tokens, *arrived], key=lambda message: message.published)
+            arrived = sorted([*((token, 0) for token in self._tokens), *arrived], key=lambda one: one[0].published)
             self._tokens = []
         write, views = self._files.write, self._views
-        for message in arrived:
+        for message, sequence in arrived:
             channel, kind = self._channels.get((message.key, message.encoding)) or self._new_channel(message)
-            sequence = self._number_of(message) if kind else 0
             write(channel, message.payload, message.received, message.published, sequence)
             if kind:
                 try:
@@ -217,14 +222,15 @@ class RecorderNode:
                     continue
                 for copy, data in copies:
                     write(copy, data, message.received, message.published, sequence)
+        self._files.flush()
         self._messages += len(arrived)
 
     def _number_of(self, message: Raw) -> int:
-        """Return the sequence number that the sender gave to a message, modulo 2^32; 0 if it has none.
+        """Return the sequence number that the sender gave to a message, modulo 2^32; 0 if it has none, or the message is of no known type.
 
         If numbers are missing since the last message of this sender and key, these messages count as lost.
         """
-        sender = sender_of(message.payload)
+        sender = sender_of(message.payload) if message.encoding in self._kinds else None
         if sender is None:
             return 0
         src, seq = sender

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import signal
 import sqlite3
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -32,6 +33,8 @@ class FakeReaches(FakeController):
     def __init__(self, rig: Rig, part: str) -> None:
         self.reaches: list[ReachFor] = []
         self.presented: list[list[float]] = []
+        self.refusals: list[float] = []  # of targets, monotonic clock
+        self.refuses = 0  # how many targets are refused because another service presents one
         self._reach = rig.bus.publisher(Reach, part)
         rig.serve(keys.goal("*", "reach"), ReachFor, self._asked)
         rig.serve(keys.world_rpc("add"), AddObject, self._added)
@@ -40,6 +43,9 @@ class FakeReaches(FakeController):
 
     def _added(self, request: AddObject, key: str) -> Done:
         assert (request.name, request.role) == (TARGET, "target")
+        if len(self.refusals) < self.refuses:
+            self.refusals.append(time.monotonic())
+            raise Refusal("owned")
         self.presented.append(request.position)
         return Done(v=VERSION)
 
@@ -129,6 +135,15 @@ def test_a_killed_agent_continues_with_its_model(stage: tuple[Rig, FakeReaches])
     assert steps(made)[: len(before)] == before
     assert sum(row["a"] < 0 for row in steps(made)) == 6
     wait_for(lambda: [event.code for event in events] == ["resumed"], "the event")
+
+
+def test_an_agent_waits_while_another_service_presents_a_target(stage: tuple[Rig, FakeReaches]) -> None:
+    made, controller = stage
+    controller.refuses = 3
+    assert agent(made, "--tries", "1", "--strategy", "random").wait(60.0) == 0
+    assert len(controller.presented) == 1
+    first, *later = controller.refusals
+    assert later[-1] - first > 1.5  # two waits
 
 
 def test_an_unknown_predictor_is_reported_in_one_line(stage: tuple[Rig, FakeReaches]) -> None:

@@ -5,7 +5,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
+from io import FileIO
+from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from threading import Lock
 from typing import Any
@@ -17,6 +20,7 @@ LEFT_OUT = ("body", "control", "events")  # recorded in other forms: motor posit
 SHOWN_EVENTS = 60  # the newest
 SELDOM = {"curves": 10.0, "baselines": 10.0}  # s of the robot between two values that are recorded: a curve is long, and grows slowly
 FULL = 500_000_000  # bytes at which a record ends
+BUFFER = 1 << 16  # bytes of lines that wait to be written
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,14 +35,22 @@ class Entry:
 class Record:
     """The file that records the values of the page, one line of JSON for each value, up to 500 MB.
 
-    A line that would exceed this size is not written. Any thread may write.
+    A line that would exceed this size is not written. While the file cannot be written, for example because the disk is full, the values
+    are lost, and `trouble` is the reason; the file always ends with a complete line. Any thread may write.
     """
 
     def __init__(self, path: Path, now: Callable[[], float]) -> None:
-        """Open the file `path` of the recorded values; `now`: returns the robot's time [s]."""
-        self._file = path.open("a", encoding="utf-8", buffering=1 << 16)
+        """Open the file `path` of the recorded values, and remove its last line if it is incomplete.
+
+        `now`: returns the robot's time [s].
+        """
+        self._file = path.open("ab", buffering=0)
+        self._size = _end_of_lines(path)  # bytes of complete lines
+        self._file.truncate(self._size)
+        self._waiting = b""  # lines
         self._next: dict[str, float] = {}  # s, by name
-        self._now, self._lock, self._size = now, Lock(), path.stat().st_size
+        self._now, self._lock = now, Lock()
+        self.trouble = ""
 
     def put(self, name: str, text: str) -> None:
         """Append a value, its name and the robot's present time to the file.
@@ -51,22 +63,57 @@ class Record:
             return
         if name in SELDOM:
             self._next[name] = now + SELDOM[name]
-        line = f'[{now:.3f},"{name}",{text}]\n'
+        line = f'[{now:.3f},"{name}",{text}]\n'.encode()
         with self._lock:
-            if self._size + len(line) < FULL and not self._file.closed:
-                self._file.write(line)
-                self._size += len(line)
+            if self._size + len(self._waiting) + len(line) < FULL and not self._file.closed:
+                self._waiting += line
+                if len(self._waiting) > BUFFER:
+                    self._write()
 
     def flush(self) -> None:
         """Hand all written lines to the operating system, so that they are kept even if this process is killed."""
         with self._lock:
             if not self._file.closed:
-                self._file.flush()
+                self._write()
 
     def close(self) -> None:
         """Close the file of the recorded values; later values are not recorded."""
         with self._lock:
-            self._file.close()
+            if not self._file.closed:
+                self._write()
+                self._file.close()
+
+    def _write(self) -> None:
+        """Write the lines that wait; if that fails, they are lost, and none of them stays in part."""
+        lines, self._waiting = self._waiting, b""
+        if not lines:
+            return
+        try:
+            if self.trouble:
+                self._file.truncate(self._size)
+            _write_all(self._file, lines)
+        except OSError as error:
+            self.trouble = error.strerror or str(error)
+            with suppress(OSError):  # before the next lines it is tried again
+                self._file.truncate(self._size)
+        else:
+            self._size += len(lines)
+            self.trouble = ""
+
+
+def _write_all(file: FileIO, data: bytes) -> None:
+    """Write data to an unbuffered file, which may take a part of them at a time."""
+    left = memoryview(data)
+    while left:
+        left = left[file.write(left) :]
+
+
+def _end_of_lines(path: Path) -> int:
+    """Return the number of bytes up to the end of the last complete line of a file."""
+    if not path.stat().st_size:
+        return 0
+    with path.open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as content:
+        return content.rfind(b"\n") + 1
 
 
 def entries(path: Path) -> list[Entry]:

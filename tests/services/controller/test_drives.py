@@ -3,7 +3,10 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
+import pytest
 
 from bus_schema import VERSION, encode, encoding_of
 from bus_schema.messages import EStop, Event
@@ -11,8 +14,8 @@ from tests.services.controller.stage import PARTS, ROBOT, Stage, near, refused
 from tests.services.harness import wait_for
 
 
-def publish_stop(run: Stage, stop: bool) -> None:
-    header = {"v": VERSION, "run": "another", "src": "test", "seq": 0, "k": 0, "t": 0, "tw": 0}
+def publish_stop(run: Stage, stop: bool, src: str = "test", of_run: str = "another") -> None:
+    header = {"v": VERSION, "run": of_run, "src": src, "seq": 0, "k": 0, "t": 0, "tw": 0}
     message = EStop(**header, set=stop, source="test", reason="test")
     run.rig.session.put(EStop.stream.key(), encode(message), encoding=encoding_of(EStop))
 
@@ -40,6 +43,33 @@ def test_a_stop_that_robot_sim_does_not_know_is_repeated_until_it_is_latched_and
     for gate in run.sim.gates.values():
         gate.state = "hold"
     run.play(lambda: all(run.motion(part).status == "idle" for part in ROBOT.parts), "all parts to be armed", ticks=1000)
+
+
+@pytest.mark.parametrize("shown", ["armed", "hold"])
+def test_an_action_ends_at_a_stop_that_was_reset_before_the_next_tick(run: Stage, shown: str) -> None:
+    """In a pause, after which the first tick shows the gates as they were before it, or while the controller was frozen."""
+    _, epoch = run.own("left_arm")
+    run.goal("left_arm", epoch, near("left_arm", 0.8), "stopped")
+    run.ticks(30)
+    assert run.motion("left_arm").status == "moving"
+    publish_stop(run, True)
+    publish_stop(run, True, "robot_sim", run.rig.bus.run)
+    time.sleep(0.3)  # until both have arrived
+    if shown == "hold":
+        for part in PARTS:
+            run.sim.hold(part)
+    since, count = run.rig.bus.k, len(run.motions["left_arm"])
+    run.tick()
+    motion = run.motion("left_arm")
+    assert (motion.status, motion.action_id) == ("held", "stopped")
+    assert {order.mode for order in run.commands("left_arm", since)} <= {"hold"}
+    for part in PARTS:
+        run.sim.hold(part)
+    run.play(lambda: {run.motion(part).status for part in PARTS} == {"idle"}, "all parts to be armed", ticks=1000)
+    before = run.sim.of("left_arm").copy()
+    run.ticks(50)
+    np.testing.assert_allclose(run.sim.of("left_arm"), before, atol=1e-3)
+    assert {motion.status for motion in run.motions["left_arm"][count:]} == {"held", "idle"}
 
 
 def test_a_part_that_the_gate_drops_is_armed_again_at_rest_and_its_action_continues(run: Stage) -> None:

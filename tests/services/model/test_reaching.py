@@ -122,9 +122,9 @@ def test_the_target_is_removed_when_the_service_that_presented_it_has_ended(reac
 
 def test_a_second_service_that_presents_a_target_is_refused(reacher: Reacher) -> None:
     reacher.present()
-    with pytest.raises(CallFailed, match="agent_right_arm can after agent_left_arm has ended. A scenario can have one") as caught:
+    with pytest.raises(CallFailed, match="^agent_left_arm presents .* agent_right_arm can after agent_left_arm has ended") as caught:
         reacher.present("agent_right_arm")
-    assert caught.value.code == "world"
+    assert caught.value.code == "owned"
     reacher.present(position=[-0.3, 0.2, 0.1])
     np.testing.assert_allclose(reacher.stage.world()[TARGET].position, [-0.3, 0.2, 0.1])
 

@@ -251,3 +251,71 @@ def test_an_object_that_vision_withdraws_or_hardly_knows_is_stale_at_once(run: S
     run.perceive([-0.3, 0.1, 0.0])
     wait_for(lambda: "ball" in run.world(), "the ball again")
     assert run.listed().stale == {}
+
+
+def test_a_client_that_adds_a_perceived_object_gives_it_the_role(run: Stage) -> None:
+    run.perceive([-0.3, 0.1, 0.0])
+    wait_for(lambda: "ball" in run.world(), "the ball")
+    run.edit("role", SetRole, name="ball", role="ghost")
+    for _ in range(2):
+        run.edit("add", AddObject, name="ball", geometry=BALL, position=[-0.5, 0.0, 0.3], quaternion=UPRIGHT, role="obstacle")
+        assert run.world()["ball"].role == "obstacle"
+    run.edit("remove", OneName, name="ball")
+    run.perceive([-0.3, 0.1, 0.0])
+    wait_for(lambda: "ball" in run.world(), "the ball again")
+    assert run.world()["ball"].role == "target"
+
+
+def perceived_in_hand(run: Stage) -> None:
+    run.perceive([-0.3, 0.1, 0.0], valid_for=20)
+    wait_for(lambda: "ball" in run.world(), "the ball")
+    run.edit("attach", Attach, name="ball", link="l_hand")
+
+
+def test_a_new_run_forgets_also_a_perceived_object_that_is_attached(run: Stage) -> None:
+    perceived_in_hand(run)
+    run.sim.new_run()
+    run.tick()
+    assert "ball" not in run.world()
+
+
+@pytest.mark.parametrize(
+    "change", [{}, {"covariance": (0.01**2 * np.eye(3)).ravel().tolist()}, {"valid_for": -1}], ids=["same", "less certain", "withdrawn"]
+)
+def test_vision_does_not_move_detach_or_remove_an_attached_object(run: Stage, change: dict[str, Any]) -> None:
+    perceived_in_hand(run)
+    before = run.world()["ball"]
+    run.tick()
+    run.perceive([-0.5, 0.1, 0.0], **change)
+    wait_for(lambda: run.world()["ball"].t_capture == run.rig.bus.t, "the message")
+    run.tick()
+    after = run.world()["ball"]
+    assert (after.link, after.position, after.margin) == ("l_hand", before.position, before.margin)
+
+
+@pytest.mark.parametrize(("valid_for", "ticks"), [(None, 20), (40, 41), (-1, 1)], ids=["not seen again", "seen", "withdrawn"])
+def test_a_detached_object_expires_as_vision_said_last(run: Stage, valid_for: int | None, ticks: int) -> None:
+    perceived_in_hand(run)
+    run.tick()
+    if valid_for is not None:
+        run.perceive([-0.3, 0.1, 0.0], valid_for=valid_for)
+        wait_for(lambda: run.world()["ball"].t_capture == run.rig.bus.t, "the message")
+    if valid_for == -1:
+        run.tick()
+        assert "ball" in run.world()
+    run.edit("detach", OneName, name="ball")
+    for _ in range(ticks - 1):
+        run.tick()
+        assert "ball" in run.world()
+    run.tick()
+    assert "ball" not in run.world()
+
+
+def test_an_attached_object_stays_however_long_it_is_not_seen(run: Stage) -> None:
+    perceived_in_hand(run)
+    for _ in range(25):
+        run.tick()
+    assert run.world()["ball"].link == "l_hand"
+    run.edit("detach", OneName, name="ball")
+    run.tick()
+    assert "ball" not in run.world()

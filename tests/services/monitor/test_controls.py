@@ -11,14 +11,21 @@ from typing import Any, cast
 
 import pytest
 
-from bus_schema.messages import EStop
+from bus_schema import keys
+from bus_schema.messages import EStop, Geometry, Motion
+from bus_schema.rpc import ObjectState
+from mobee import load_robot
+from mobee.reach import TARGET
 from services.common.observe import listen
+from services.common.rpc import CallFailed
 from services.common.service import Service
 from services.monitor.controls import STOP_PERIOD, Known, PageControls
 from services.monitor.web.board import Board
 from services.monitor.web.server import Refused
 from tests.services.harness import wait_for
 from tests.services.stage import Stage
+
+PLACE = [-0.3, 0.2, 0.1]  # m
 
 
 class Stopped:
@@ -38,6 +45,85 @@ class Stopped:
     def confirm(self) -> None:
         """All parts report the stop."""
         self.known.stopped = time.monotonic()
+
+
+class Clicked:
+    """Controls of a page whose calls are answered at once, and the calls that they have made, with their data.
+
+    The world of the model and the presenter of its target are simulated. `presents`: name of the service that presents the target.
+    """
+
+    def __init__(self) -> None:
+        self.made: list[str] = []
+        self.presents, self.epoch = "", 1
+        self.known = Known()
+        self.alive: dict[str, set[str]] = {}
+        bus = SimpleNamespace(publisher=lambda cls: None)
+        service: Any = SimpleNamespace(bus=bus, call=self._call, alive=self.alive, instance="i")
+        self.robot = load_robot("icub")
+        self.controls = PageControls(cast(Service, service), self.robot, self.known, Board(), lambda shown: None)
+
+    def do(self, verb: str, **given: Any) -> str:
+        return self.controls.do("p", verb, given)
+
+    def move_slider(self, part: str) -> None:
+        self.do("goal", part=part, q=self.robot.home[self.robot.part(part).slice].tolist())
+
+    def _call(self, key: str, request: object, reply: object, **fields: Any) -> Any:
+        self.made.append(key)
+        part = key.split("/")[0]
+        if key == keys.goal(part, "take"):
+            self.epoch += 1
+            self.known.motions[part] = cast(Motion, SimpleNamespace(epoch=self.epoch, status="idle"))
+            return SimpleNamespace(epoch=self.epoch)
+        if key == keys.world_rpc("add"):
+            if self.presents not in ("", "monitor"):
+                raise CallFailed("owned", f"{self.presents} presents 'reach_target', and only one service at a time can")
+            self.presents = "monitor"
+        if key == keys.world_rpc("remove"):
+            self.presents = ""
+        return None
+
+
+@pytest.fixture
+def clicked() -> Clicked:
+    return Clicked()
+
+
+def test_the_target_of_a_page_is_removed_when_the_part_is_given_back_although_a_slider_was_moved(clicked: Clicked) -> None:
+    clicked.do("reach", part="right_arm", position=PLACE)
+    clicked.move_slider("right_arm")
+    assert clicked.presents == "monitor"
+    clicked.do("give", part="right_arm")
+    assert clicked.presents == ""
+
+
+def test_a_page_removes_the_target_of_an_agent_that_rests_for_it(clicked: Clicked) -> None:
+    clicked.alive["agent_right_arm"], clicked.presents = {"a"}, "agent_right_arm"
+    clicked.do("reach", part="right_arm", position=PLACE)
+    assert clicked.presents == "monitor"
+    clicked.do("give", part="right_arm")
+    assert (clicked.presents, clicked.made[-1]) == ("", keys.service_rpc("agent_right_arm", "resume"))
+
+
+def test_a_page_leaves_the_target_of_a_working_agent(clicked: Clicked) -> None:
+    clicked.alive |= {"agent_right_arm": {"a"}, "agent_left_arm": {"b"}}
+    clicked.presents = "agent_right_arm"
+    clicked.known.objects[TARGET] = ObjectState(TARGET, Geometry("sphere", [0.05]), PLACE, [1.0, 0.0, 0.0, 0.0], role="target", link="")
+    with pytest.raises(Refused, match="agent_right_arm presents"):
+        clicked.do("reach", part="left_arm", position=PLACE)
+    clicked.do("give", part="left_arm")
+    assert clicked.presents == "agent_right_arm"
+    assert keys.world_rpc("remove") not in clicked.made
+
+
+def test_the_explorer_changes_for_the_agents_that_run(clicked: Clicked) -> None:
+    clicked.alive |= {"agent_left_arm": {"a"}, "agent_torso": set()}  # the second has ended
+    assert "left arm explore" in clicked.do("explore", explorer="random")
+    assert clicked.made == [keys.service_rpc("agent_left_arm", "explore")]
+    clicked.alive["agent_left_arm"].clear()
+    with pytest.raises(Refused, match="no agent runs"):
+        clicked.do("explore", explorer="random")
 
 
 @pytest.fixture
@@ -71,6 +157,17 @@ def test_a_release_ends_the_repetition_of_a_stop_that_was_not_confirmed(stopped:
     with pytest.raises(Refused, match="released the robot before all parts confirmed"):
         stopped.controls.do("p", "stop", {})
     assert stopped.sent == 1
+
+
+def test_in_a_pause_the_confirmation_by_robot_sim_is_sufficient(stopped: Stopped) -> None:
+    def confirm() -> None:
+        stopped.known.confirmed = time.monotonic()
+
+    stopped.on_stop = confirm
+    assert stopped.controls.do("p", "stop", {}) == "Stopped: all motors, as robot_sim confirms."
+    stopped.known.heard = float("inf")  # a part publishes its state, and is not stopped
+    with pytest.raises(Refused, match="use the robot's own emergency button"):
+        stopped.controls.do("p", "stop", {})
 
 
 def test_a_stop_that_is_not_confirmed_is_said(stopped: Stopped) -> None:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import resource
 import signal
 import socket
 import subprocess
@@ -19,12 +20,13 @@ import numpy as np
 import psutil
 import pytest
 
-from bus_schema import VERSION
+from bus_schema import VERSION, decode, keys
 from bus_schema.messages import Clock, ContactItem, Contacts, Event, Forces, Geometry, Image, Motion, State, Transition, Truth, WorldObject
 from bus_schema.rpc import ObjectState
 from mobee.model.kinematics import link_transforms
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Shape, ShapeKind
+from services.common.observe import listen
 from tests.services.robots import ARM
 from tests.services.stage import LOOKING_DOWN, Stage, posture
 
@@ -35,6 +37,7 @@ from services.monitor.viewer.blueprint import blueprint, shown_of  # noqa: E402 
 from services.monitor.viewer.files import program  # noqa: E402  # only where Rerun is
 from services.monitor.viewer.plots import Plots  # noqa: E402  # only where Rerun is
 from services.monitor.viewer.scene import FIELD_PATHS, Scene  # noqa: E402  # only where Rerun is
+from services.monitor.web.record import entries  # noqa: E402  # only where Rerun is
 
 ROBOT = load_robot("icub")
 DOWN = posture(ROBOT, LOOKING_DOWN)
@@ -273,6 +276,41 @@ def test_the_recording_holds_everything_there_is_to_see(stage: Stage, tmp_path: 
     wanted |= {f"/plots/joints/{part}" for part in palette.PARTS}
     assert wanted - shown == set()
     assert any(path.startswith("/robot/links/l_hand/volume_") for path in shown)  # its fingers move, so it is drawn as its solids
+
+
+def test_a_full_disk_does_not_end_the_monitor(stage: Stage, tmp_path: Path) -> None:
+    said: list[str] = []
+    listen(stage.session, Event.stream.key("monitor"), lambda heard: said.append(decode(Event, heard.payload, heard.encoding).text))
+    story = tmp_path / "story.jsonl"
+    with stage.running("services.monitor", "monitor", "--no-serve", "--run-dir", str(tmp_path)) as monitor:
+        assert stage.play(DOWN, lambda: stage.k > 50)
+        resource.prlimit(monitor.pid, resource.RLIMIT_FSIZE, (story.stat().st_size + 500, resource.RLIM_INFINITY))
+        assert stage.play(DOWN, lambda: "nothing of the page is recorded: File too large" in said)
+        full = len(entries(story))
+        resource.prlimit(monitor.pid, resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+        assert stage.play(DOWN, lambda: "the page is recorded again" in said)
+        assert monitor.poll() is None
+    assert len(entries(story)) > full
+
+
+def test_the_page_says_that_a_service_has_ended(stage: Stage, tmp_path: Path) -> None:
+    def statuses() -> list[dict[str, Any]]:
+        return [one.value for one in entries(tmp_path / "story.jsonl") if one.name == "status"]
+
+    def titles() -> list[str]:
+        return [status["banner"]["title"] for status in statuses() if status["banner"]]
+
+    wanted: list[str] = []
+    tokens = {who: stage.session.liveliness().declare_token(keys.alive(who, "i")) for who in ("robot_sim", "controller", "agent_torso")}
+    with stage.running("services.monitor", "monitor", "--no-serve", "--run-dir", str(tmp_path)):
+        assert stage.play(DOWN, lambda: any(status["agents"] == ["torso"] for status in statuses()))
+        tokens["agent_torso"].undeclare()
+        assert stage.play(DOWN, lambda: statuses()[-1]["agents"] == [])
+        for who, title in (("controller", "The controller is gone"), ("robot_sim", "The robot is gone")):
+            assert title not in titles()
+            tokens[who].undeclare()
+            wanted.append(title)
+            assert stage.play(DOWN, lambda: wanted[-1] in titles())
 
 
 def test_the_page_is_served_on_loopback_only_and_nothing_but_events_is_published(stage: Stage, web_port: int) -> None:

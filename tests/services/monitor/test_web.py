@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import http.client
 import json
+import resource
 import threading
 import time
 from collections.abc import Iterator
@@ -177,3 +178,33 @@ def test_a_record_is_read_as_it_was_written_also_if_its_end_was_cut_off(tmp_path
         (0.0, "cards", [{"part": "arm"}]),
         (1.0, "q", [0.1]),
     ]
+
+
+def test_a_record_that_is_continued_begins_after_the_last_complete_line(tmp_path: Path) -> None:
+    path = tmp_path / "story.jsonl"
+    path.write_text('[1.0,"q",1]\n[2.0,"cards",[{"pa')
+    record = Record(path, lambda: 3.0)
+    record.put("q", "2")
+    record.close()
+    assert [(one.time, one.value) for one in entries(path)] == [(1.0, 1), (3.0, 2)]
+
+
+def test_a_record_on_a_full_disk_loses_values_and_continues_when_there_is_room(tmp_path: Path) -> None:
+    path = tmp_path / "story.jsonl"
+    record = Record(path, lambda: 0.0)
+    record.put("q", "1")
+    record.flush()
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (path.stat().st_size + 5, limits[1]))
+    try:
+        record.put("q", "2")
+        record.flush()
+        assert record.trouble == "File too large"
+        record.put("cards", json.dumps("long" * 50_000))
+        assert [one.value for one in entries(path)] == [1]
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    record.put("q", "3")
+    record.close()
+    assert record.trouble == ""
+    assert [one.value for one in entries(path)] == [1, 3]

@@ -3,6 +3,9 @@ from __future__ import annotations
 
 import io
 import random
+import resource
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -134,3 +137,45 @@ def test_keys_without_number_begin_new_files_and_lose_nothing(tmp_path: Path) ->
     files.close()
     assert [one.key for one in Recording(tmp_path)] == names
     assert files.begun == 3
+
+
+@contextmanager
+def full_disk(room: int) -> Iterator[None]:
+    """In it this process can write files of at most `room` bytes."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (room, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+def test_after_a_full_disk_a_new_file_begins_and_all_that_was_flushed_is_read(tmp_path: Path) -> None:
+    files, noise = Files(tmp_path, 2 * 10**9, {}), random.Random(0)
+
+    def write(batch: int) -> None:
+        for _ in range(50):
+            files.write(Channel("tick", "msgpack", "x"), noise.randbytes(2000), batch, batch)
+        files.flush()
+
+    write(0)
+    with full_disk(files.size + 50_000), pytest.raises(OSError, match="File too large"):
+        write(1)
+    for batch in (2, 3):
+        write(batch)
+    files.close()
+    assert [one.received for one in Recording(tmp_path)] == [batch for batch in (0, 2, 3) for _ in range(50)]
+    assert files.begun == len(parts_of(tmp_path)) == 2
+
+
+def test_tries_on_a_full_disk_leave_no_files_that_cannot_be_read(tmp_path: Path) -> None:
+    writer = Writer(tmp_path, robot_sim="rate = 50")
+    with full_disk(0):
+        for end in (writer.files.flush, writer.files.close):
+            writer.tick(0)
+            with pytest.raises(OSError, match="File too large"):
+                end()
+            assert parts_of(tmp_path) == [] and writer.files.begun == 0
+    writer.tick(1)
+    writer.files.close()
+    assert [one.payload for one in Recording(tmp_path)] == [message(1)] and writer.files.begun == 1

@@ -14,6 +14,7 @@ from bus_schema import keys
 from bus_schema.messages import EStop
 from bus_schema.rpc import Done, Driven, Empty, Reply, Request, Take, Taken, WithEpoch
 from mobee.model.masses import gravity_torque
+from mobee_cli.__main__ import main
 from services.common.bus import Bus
 from services.common.rpc import CallFailed
 from tests.services.harness import wait_for
@@ -100,6 +101,17 @@ def test_an_emergency_stop_is_obeyed_in_a_pause_although_no_tick_begins(bench: B
     bench.rig.call(keys.sim("resume"), Empty, Done)
     wait_for(lambda: bench.clocks[-1].mode == "free", "the clock")
     assert np.median(delays) < 2e8  # ns, by robot_sim's clock
+
+
+def test_an_emergency_stop_in_a_pause_is_confirmed_to_mobee_estop(bench: Bench, capsys: pytest.CaptureFixture[str]) -> None:
+    bench.rig.call(keys.sim("pause"), Empty, Done)
+    wait_for(lambda: bench.clocks[-1].mode == "paused", "the pause")
+    assert main(["estop", "--endpoint", bench.rig.endpoint, "--reason", "in a pause"]) == 0
+    assert capsys.readouterr().out.startswith("stopped: all parts, as robot_sim confirms")
+    assert bench.rig.stat("robot_sim").text.startswith("emergency stop by mobee")
+    bench.rig.call(keys.ESTOP_RESET, Empty, Done)
+    bench.rig.call(keys.sim("resume"), Empty, Done)
+    wait_for(lambda: bench.clocks[-1].mode == "free", "the clock")
 
 
 def test_only_the_client_that_paused_can_resume_while_it_runs(bench: Bench) -> None:
