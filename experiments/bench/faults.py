@@ -249,7 +249,7 @@ def _result(
             who: {"survived": sum(lasted for one, lasted in actions if one == who), "of": sum(one == who for one, _ in actions)}
             for who in ("agent", "model")
         },
-        "transitions": {"kept": kept.kept, "lost": kept.lost, "differing": kept.differing, "gaps": kept.repeated},
+        "transitions": {"kept": kept.kept, "lost": kept.lost, "differing": kept.differing, "repeated": kept.repeated},
         "broken": broken,
         "rows": rows,
         "times_judged": quiet,
@@ -283,7 +283,7 @@ def report(result: dict[str, Any]) -> str:
     if result["rates"] is not None:
         without, with_faults = result["rates"]
         lines.append(f"transitions a second: {without:.2f} without faults, {with_faults:.2f} with: {100.0 * result['cost']:.0f} % less")
-    lines.append(f"transitions: {kept['kept']} kept, {kept['lost']} lost, {kept['differing']} differ, {kept['gaps']} gaps")
+    lines.append(f"transitions: {kept['kept']} kept, {kept['lost']} lost, {kept['differing']} differ, {kept['repeated']} repeated")
     lines += result["broken"] or ["no promise broken"]
     if not result["times_judged"]:
         lines.append(f"times are not judged: the load was above {QUIET:g}, or the robot ran in lockstep")

@@ -102,10 +102,10 @@ def measure(settings: Settings) -> dict[str, Any]:
 
     Main keys: "oldest_ms", age of the oldest command that was obeyed [ms]; "back_s", longest time from the end of a disturbance until all
     parts of the robot follow commands and the left arm, whose agent is on the second host, moves [s]; "transitions", dict with numbers of
-    transitions: "kept" (on disk), "lost" (published, but not on disk), "differing" (with other values than published) and "gaps" (on disk
-    twice, under one number); "broken", list of the broken guarantees as text; "rows", a list with a dict for each disturbance ("layout",
-    "fault" and its measurements); "passed", whether no guarantee is broken, no transition is lost, differs or is stored twice, and "back_s"
-    is small enough.  If the machine was busy, "back_s" is not judged.
+    transitions: "kept" (on disk), "lost" (published, but not on disk), "differing" (with other values than published) and "repeated" (on
+    disk twice, under one number); "broken", list of the broken guarantees as text; "rows", a list with a dict for each disturbance
+    ("layout", "fault" and its measurements); "passed", whether no guarantee is broken, no transition is lost, differs or is stored twice,
+    and "back_s" is small enough.  If the machine was busy, "back_s" is not judged.
     """
     argv = [sys.executable, "-m", "mobee_system.run", "experiments.bench.network", msgspec.json.encode(asdict(settings)).decode()]
     done = subprocess.run(inside(argv), stdout=subprocess.PIPE, text=True)
@@ -130,7 +130,7 @@ def main() -> None:
 
 def _measured(settings: Settings) -> dict[str, Any]:
     rows: list[dict[str, Any]] = []
-    kept: dict[str, int] = {"kept": 0, "lost": 0, "differing": 0, "gaps": 0}
+    kept: dict[str, int] = {"kept": 0, "lost": 0, "differing": 0, "repeated": 0}
     begun = time.monotonic()
     with Progress() as progress:
         for layout in settings.layouts:
@@ -221,10 +221,10 @@ class _Hosts:
     def compare(self) -> dict[str, int]:
         """Compare the published transitions with those on disk, on both hosts, and return their numbers.
 
-        Keys: "kept" (on disk), "lost" (published, but not on disk), "differing" (with other values than published) and "gaps" (on disk
+        Keys: "kept" (on disk), "lost" (published, but not on disk), "differing" (with other values than published) and "repeated" (on disk
         twice, under one number).
         """
-        found = {"kept": 0, "lost": 0, "differing": 0, "gaps": 0}
+        found = {"kept": 0, "lost": 0, "differing": 0, "repeated": 0}
         beyond = {who.removeprefix(AGENT) for who in LAYOUTS[self._layout] if who.startswith(AGENT)}
         for host, agents in (("first", sorted({*AGENTS} - beyond)), ("second", sorted(beyond))):
             if agents:
@@ -334,7 +334,7 @@ def _result(settings: Settings, rows: list[dict[str, Any]], kept: dict[str, int]
     load = float(np.median([row["load"] for row in rows]))
     broken = [f"{row['layout']}, {row['fault']}: {line}" for row in rows for line in row["broken"]]
     quiet, back = load <= QUIET, max(row["back_s"] for row in rows)
-    whole = kept["lost"] == kept["differing"] == kept["gaps"] == 0
+    whole = kept["lost"] == kept["differing"] == kept["repeated"] == 0
     return {
         "seed": settings.seed,
         "seconds": seconds,
@@ -363,7 +363,7 @@ def report(result: dict[str, Any]) -> str:
             f"{row['layout']:<9}{row['fault']:<18}{row['seconds']:>6.0f}{row['oldest_ms']:>11.0f}{hold:>9}{ended:>9}{row['back_s']:>8.2f}  "
             f"{len(row['held'])} parts"
         )
-    lines.append(f"transitions: {kept['kept']} kept, {kept['lost']} lost, {kept['differing']} differ, {kept['gaps']} gaps")
+    lines.append(f"transitions: {kept['kept']} kept, {kept['lost']} lost, {kept['differing']} differ, {kept['repeated']} repeated")
     lines += result["broken"] or ["no promise broken"]
     if not result["times_judged"]:
         lines.append(f"times are not judged: the load was above {QUIET:g}")

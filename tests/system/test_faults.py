@@ -20,4 +20,4 @@ def test_under_a_schedule_of_faults_nothing_is_lost_and_every_part_is_back() -> 
     assert result["broken"] == []
     assert result["never_held"] == 0
     kept = result["transitions"]
-    assert (kept["lost"], kept["differing"], kept["gaps"]) == (0, 0, 0)
+    assert (kept["lost"], kept["differing"], kept["repeated"]) == (0, 0, 0)

@@ -20,4 +20,4 @@ def test_the_robot_holds_beyond_a_silent_cut_and_is_back_after_it() -> None:
     assert result["broken"] == []
     assert result["rows"][0]["held"] == ["head", "left_arm", "right_arm", "torso"]
     kept = result["transitions"]
-    assert (kept["lost"], kept["differing"], kept["gaps"]) == (0, 0, 0)
+    assert (kept["lost"], kept["differing"], kept["repeated"]) == (0, 0, 0)

@@ -99,7 +99,7 @@ def test_a_transition_that_is_lost_or_differs_is_found(tmp_path: Path) -> None:
     observer = Observer()
     observer.published = {("torso", n): (1, 2, 3, True, 4.0) for n in (1, 2)}
     kept = compare_transitions(observer, tmp_path, ["torso"])
-    assert (kept.kept, kept.lost, kept.differing, kept.gaps) == (2, 0, 0, 0)
+    assert (kept.kept, kept.lost, kept.differing, kept.repeated) == (2, 0, 0, 0)
     observer.published |= {("torso", 3): (1, 2, 3, True, 4.0), ("torso", 2): (1, 2, 4, True, 4.0)}
     kept = compare_transitions(observer, tmp_path, ["torso"])
     assert (kept.lost, kept.differing) == (1, 1)
