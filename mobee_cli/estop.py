@@ -16,12 +16,11 @@ from mobee_cli.connect import add_endpoint, connected
 from mobee_cli.errors import UserError
 from services.common import rpc
 from services.common.bus import Bus
-from services.common.emergency_stop import StopLine, StopRecord, StopSender
+from services.common.emergency_stop import SILENCE, StopLine, StopRecord, StopSender
 from services.common.exit_codes import ENVIRONMENT
 from services.common.observe import Received, alive, listen
 
 _REPEAT, _PATIENCE, _CONNECT_PATIENCE = 0.1, 5.0, 2.0  # s; a machine under attack is slow
-_SILENCE = 0.5  # s without any state of a part, after which the confirmation by robot_sim is sufficient
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -103,7 +102,7 @@ def _stop(session: Any, sender: StopSender, reason: str) -> str:
         if seen and all(seen.values()):
             return ", ".join(sorted(seen))
         is_confirmed |= sender.is_confirmed() or any(stop.src == "robot_sim" for stop in line.take())
-        if is_confirmed and time.monotonic() > heard + _SILENCE:
+        if is_confirmed and time.monotonic() > heard + SILENCE:
             return "all parts, as robot_sim confirms (no part publishes its state, as in a pause)"
     moving = [part for part, is_stopped in stopped.items() if not is_stopped]
     result = f"{', '.join(moving)} did not stop" if moving else "no part of a robot publishes its state"

@@ -94,8 +94,8 @@ def _require_no_setup(arguments: argparse.Namespace) -> None:
     given = given_options(arguments, ("world", "explorer", "seed", "seconds", "transitions", "save"))
     given += [arguments.robot] * (arguments.robot is not None) + ["--part"] * bool(arguments.parts)
     given += ["--offline-only"] * arguments.offline_only
-    for option in given:
-        raise UserError(f"{option}: not valid with --learned, which continues live what `mobee learn` has set up: leave it out", BAD_INPUT)
+    if given:
+        raise UserError(f"{given[0]}: not valid with --learned, which continues what `mobee learn` has set up: leave it out", BAD_INPUT)
 
 
 def _files(arguments: argparse.Namespace, setup: Setup) -> Files:

@@ -121,8 +121,8 @@ class CuriousAgent(CuriousLearner):
     def observe(self, outcome: Outcome) -> float:
         """Learn from the outcome of the action that was decided last; return the reward, the information gain, in nats.
 
-        With a store the transition is on disk when this returns; if it cannot be written, nothing is learned. Raises MobeeError if no
-        action is under way.
+        With a store the transition is on disk when this returns; if it cannot be written, nothing is learned. After an interrupt (Ctrl-C)
+        during the write, the next call of `decide` learns the transition if it is on disk. Raises MobeeError if no action is under way.
         """
         state, action = self._decided()
         self._state = None  # unknown if this call is interrupted, or the transition cannot be written

@@ -106,9 +106,13 @@ class WorldObject:
     friction: float = FRICTION
 
     def __post_init__(self) -> None:
-        """Protect the arrays from changes, because all states of the world that contain the object share them."""
-        self.position.setflags(write=False)
-        self.rotation.setflags(write=False)
+        """Copy the arrays, and protect the copies from changes, because all states of the world that contain the object share them."""
+        for name in ("position", "rotation"):
+            values: Array = getattr(self, name)
+            if values.flags.writeable:
+                values = values.copy()
+                values.flags.writeable = False
+                object.__setattr__(self, name, values)
 
     @property
     def movable(self) -> bool:

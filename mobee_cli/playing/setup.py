@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence, Sized
 from dataclasses import dataclass
 from typing import Any
 
+from mobee.arrays import checked_seed
 from mobee.control.gains import Gains
 from mobee.derivation import Arm, Derived, derive
 from mobee.errors import InvalidValue
@@ -77,9 +78,7 @@ def setup_of(arguments: argparse.Namespace, robot: str) -> Setup:
     """
     options = {name: value for name, value in urdf_options(arguments).items() if value is not None}
     parts = _parts(arguments.parts)
-    seed = 0 if arguments.seed is None else arguments.seed
-    if seed < 0:
-        raise InvalidValue(f"--seed {seed}: must be 0 or more.")
+    seed = 0 if arguments.seed is None else checked_seed(arguments.seed)
     explorer = "curious" if arguments.explorer is None else arguments.explorer
     named("explorer", explorer, EXPLORERS)  # an unknown one is refused before a file is written
     common: dict[str, Any] = {"explorer": explorer, "seed": seed}

@@ -27,6 +27,7 @@ from bus_schema.messages import EStop
 
 BY_LAUNCHER = "launcher"  # source of a stop because a vital service was given up; it ends with that launch
 FOLDER = "mobee/emergency-stop"  # in the user's folder of states
+SILENCE = 0.5  # s without any state of a part, as in a pause, after which the confirmation by robot_sim is sufficient
 
 
 class Stop(Struct, frozen=True):

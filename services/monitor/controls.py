@@ -38,7 +38,7 @@ from mobee.arrays import Array
 from mobee.errors import MobeeError
 from mobee.reach import TARGET
 from mobee.robot.robot import Robot
-from services.common.emergency_stop import StopRecord, StopSender
+from services.common.emergency_stop import SILENCE, StopRecord, StopSender
 from services.common.hands import hand_for, hand_of, part_of
 from services.common.rpc import CallFailed
 from services.common.service import Service
@@ -51,7 +51,6 @@ TRIES = 3
 FREE_PATIENCE = 4.0  # s until a part that was taken can move
 STOP_PATIENCE, STOP_PERIOD = 2.0, 0.1  # s for which an emergency stop is repeated until all parts report it
 STOP_CHECK = 0.01  # s between two checks for that report
-SILENCE = 0.5  # s without any state of a part, as in a pause, after which the confirmation by robot_sim is sufficient
 AFTER_REACH = 4.0  # s for which the hand stays after a reach, before the part is given back
 PLACE_RADIUS = 0.03  # m, of the sphere that is presented at a place
 UPRIGHT = [1.0, 0.0, 0.0, 0.0]

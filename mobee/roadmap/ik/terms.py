@@ -153,8 +153,8 @@ class Function:
             try:
                 singly = self._singly(pose)
             except Exception:  # of any kind: the function may have been written for a batch only
-                together = self._called(pose, single=False)
-                if together.shape != (len(pose.q),):
+                together = self._batched(pose)
+                if together is None:
                     raise
                 self._takes_batches = True
                 return together
@@ -174,9 +174,14 @@ class Function:
         contacts = () if not self._contacts else (pose.contacts,) if single else (pose.table,)
         return np.asarray(self._function(pose, *contacts), dtype=np.float64)
 
-    def _agrees(self, pose: Pose, singly: Array) -> bool:
+    def _batched(self, pose: Pose) -> Array | None:
+        """Return the values (N,) of one call with the batch; None if the function does not accept a batch."""
         try:
             together = self._called(pose, single=False)
-        except Exception:  # of any kind: the function has just worked pose by pose, so it was written for one pose
-            return False
-        return together.shape == singly.shape and np.allclose(together, singly, rtol=1e-9, atol=1e-12, equal_nan=True)
+        except Exception:  # of any kind: the function may have been written for one pose
+            return None
+        return together if together.shape == (len(pose.q),) else None
+
+    def _agrees(self, pose: Pose, singly: Array) -> bool:
+        together = self._batched(pose)
+        return together is not None and np.allclose(together, singly, rtol=1e-9, atol=1e-12, equal_nan=True)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import mobee
-from mobee.model.world_object import Geometry
+from mobee.model.world_object import Geometry, WorldObject
 
 HALF_TURN = np.diag([-1.0, -1.0, 1.0])
 
@@ -139,3 +139,10 @@ def test_a_place_that_is_refused_leaves_the_object_where_it_was(world):
     with pytest.raises(mobee.InvalidValue, match="three finite numbers"):
         world.attach("cup", "hand", ((0.0, 0.0, float("nan")), np.eye(3)))
     assert np.array_equal(world.objects["cup"].position, [0.1, 0.2, 0.3])
+
+
+def test_an_object_copies_the_arrays_that_it_is_made_of():
+    position, rotation = np.zeros(3), np.eye(3)
+    thing = WorldObject("cup", "sphere", (0.1,), position, rotation)
+    position[0] = rotation[0, 0] = 5.0
+    assert not thing.position.any() and np.array_equal(thing.rotation, np.eye(3))
