@@ -247,6 +247,7 @@ class _Run:
         self._judged: Sequence[Remote] = list(self._remotes.services.values()) if first is None else ()
         self._shown: Sequence[Watched] = [*self._children, *self._judged]
         self._stop_requested, self._starting, self._join_again = False, True, False
+        self._is_killing = False  # by a second signal
         if first is None:
             text = msgspec.json.encode(agreement(scenario, service.instance, options.elsewhere))
             service.configuration = lambda: text
@@ -368,12 +369,15 @@ class _Run:
         self._request_stop()
 
     def _handle_signals(self) -> None:
-        """Handle signals: the first one stops the services in order, a second one kills them."""
+        """Handle signals: the first one stops the services in order, a second one kills them, and later ones do nothing."""
         self._service.end = self._request_stop
 
         def on_signal(signum: int, frame: FrameType | None) -> None:
+            if self._is_killing:
+                return
             if self._stop_requested:
-                self._supervisor.kill_all()
+                # `_live` kills them when it ends. Here this thread could wait for a lock of `Popen` that it holds itself.
+                self._is_killing = True
                 raise SystemExit(FAILED)
             self._request_stop()
 

@@ -29,9 +29,9 @@ def test_a_follower_keeps_all_ticks_of_a_path_but_otherwise_only_those_of_two_wi
         most = round(2.0 * WINDOW * 1e9 / sim.dt_ns)
         tick(2 * most)
         assert 0 < len(follower._seen) <= most and not follower.seen()[0].size
-        follower.follow([], [robot.home] * most * 2, 0.999e-9 * sim.dt_ns, lambda share: tick())
+        follower.follow([], [robot.home] * most * 3, 0.999e-9 * sim.dt_ns, lambda share: tick())
         times, q = follower.seen()
-        assert times[0] == 0.0 and times[-1] > 0.9 * 2e-9 * most * sim.dt_ns and len(times) > 1.5 * most
+        assert times[0] == 0.0 and times[-1] > 2.0 * 2.0 * WINDOW  # only the newest of the ticks that wait is noted, so not their number
         assert q.shape == (len(times), len(robot.motors)) and follower.q == pytest.approx(robot.home)
         follower.let_go()
         tick(10)
