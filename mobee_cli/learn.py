@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from experiments.kit.command_line import positive_whole
 from experiments.kit.track import add_track, require_tracker, tracked
 from mobee.errors import MobeeError, NotInstalled
 from mobee_cli.errors import UserError
-from mobee_cli.playing.files import Files, robot_as_written, write_files
+from mobee_cli.playing.files import Files, is_edited, require_same_robot, robot_as_written, write_files
 from mobee_cli.playing.offline import learn, opened
 from mobee_cli.playing.setup import add_setup_options, setup_of
 from mobee_cli.robot_options import DEFAULT, add_robot, add_world
@@ -21,8 +22,9 @@ from services.common.exit_codes import BAD_INPUT, ENVIRONMENT
 _NOTES = """Parts, joints, limits, home, tested pairs and fields are derived from the
 robot (docs/play.md). Every transition is on disk before the next action: the
 same command continues the file, also after Ctrl-C. Beside FILE.sqlite are
-written the robot, FILE.xml, and a scenario to continue live, FILE.toml; with
---track the curves of all agents, into the folder FILE-tensorboard."""
+written the robot, FILE.xml, and a scenario to continue live, FILE.toml, which
+you may edit: it is not written again. With --track the curves of all agents
+are written into the folder FILE-tensorboard."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -48,10 +50,15 @@ def run(arguments: argparse.Namespace) -> int:
     try:
         require_tracker(arguments.track)
         setup = setup_of(arguments, arguments.robot or DEFAULT)
-        _require_no_loss(arguments, [files.scenario] if setup.shipped else [files.robot, files.scenario], files.store)
+        _require_own([files.scenario] if setup.shipped else [files.robot, files.scenario], files.store)
+        robot = robot_as_written(setup)
         for line in setup.lines:
             say(line)
-        with tracked(curves) if arguments.track else nullcontext(), opened(setup, robot_as_written(setup), files.store) as learning:
+        with tracked(curves) if arguments.track else nullcontext(), opened(setup, robot, files.store) as learning:
+            if not setup.shipped:
+                require_same_robot(robot, files)  # after the store, which names the option that has changed
+            if is_edited(setup, files):
+                print(f"{files.scenario} was edited, and is kept as it is.", file=sys.stderr)
             write_files(setup, files)  # not before the store is accepted: a refused command changes no file
             learn(learning, None, arguments.transitions, say)
             numbers, summary = learning.numbers(), learning.summary()
@@ -70,15 +77,8 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _require_no_loss(arguments: argparse.Namespace, written: list[Path], store: Path) -> None:
-    """Raise UserError if one of the paths to write is a file that the command reads, or that `mobee learn` has not written.
-
-    The files that it has written are beside their store.
-    """
-    for path in filter(Path.exists, written):
-        for name in ("robot", "world", "srdf"):
-            given = getattr(arguments, name)
-            if given is not None and Path(given).exists() and path.samefile(given):
-                raise UserError(f"--{name} {given}: `mobee learn` would replace this file: give --store another name", BAD_INPUT)
-        if not store.exists():
-            raise UserError(f"{path} exists and would be replaced, although there is no {store}: give --store another name", BAD_INPUT)
+def _require_own(written: list[Path], store: Path) -> None:
+    """Raise UserError if one of the paths to write is a file that `mobee learn` has not written: it would be beside its store."""
+    for path in written:
+        if path.exists() and not store.exists():
+            raise UserError(f"{path} exists, although there is no {store}: give --store another name", BAD_INPUT)

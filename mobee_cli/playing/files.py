@@ -5,15 +5,18 @@ from __future__ import annotations
 
 import os
 import tempfile
+import tomllib
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from mobee.errors import InvalidValue
+from mobee.model.world import World
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
 from mobee.robot.xml.write import write_xml
+from mobee.simulation.record import described
 from mobee_cli.errors import UserError
 from mobee_cli.playing.setup import Setup
 from services.common.exit_codes import BAD_INPUT, FAILED
@@ -71,16 +74,41 @@ def robot_as_written(setup: Setup) -> Robot:
         return load_robot(write_xml(setup.robot, Path(folder) / "robot.xml"))
 
 
+def require_same_robot(robot: Robot, files: Files) -> None:
+    """Raise UserError if the robot file in `files` exists and has another robot, so that the agents would learn on one and run on another.
+
+    `robot`: the robot on which the agents learn. Names, visuals and cameras may differ. Raises MobeeError if the file cannot be read.
+    """
+    if files.robot.exists() and described(load_robot(files.robot), World()) != described(robot, World()):
+        raise UserError(
+            f"{files.robot} was edited: the agents of {files.store.name} learned with another robot. To learn with the edited one, give it "
+            "as --robot, with another --store; to continue as before, move it away, and it is written again",
+            BAD_INPUT,
+        )
+
+
+def is_edited(setup: Setup, files: Files) -> bool:
+    """Return whether the scenario in `files` exists and says something else than what `write_files` would write for this setup."""
+    try:
+        return tomllib.loads(files.scenario.read_text("utf-8")) != tomllib.loads(_scenario(setup, files))
+    except FileNotFoundError:
+        return False
+    except (OSError, ValueError, RecursionError):  # TOMLDecodeError and UnicodeDecodeError are ValueErrors
+        return True
+
+
 def write_files(setup: Setup, files: Files) -> None:
     """Write the robot (unless it is a shipped one) and the scenario (services to start) of a setup to their paths in `files`.
 
-    Raises UserError if a file cannot be written, InvalidValue if the robot has properties that its file cannot express.
+    Files that exist are kept. Raises UserError if a file cannot be written, InvalidValue if the robot has properties that its file cannot
+    express.
     """
     try:
         files.store.parent.mkdir(parents=True, exist_ok=True)
-        if not setup.shipped:
+        if not setup.shipped and not files.robot.exists():
             write_xml(setup.robot, files.robot)
-        files.scenario.write_text(_scenario(setup, files), encoding="utf-8")
+        if not files.scenario.exists():
+            files.scenario.write_text(_scenario(setup, files), encoding="utf-8")
     except OSError as error:
         raise UserError(f"{error.filename or files.store.parent} cannot be written ({error.strerror})", FAILED) from error
 

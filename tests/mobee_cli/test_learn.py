@@ -125,15 +125,50 @@ def test_the_transitions_of_two_robots_are_not_mixed(arm: Path, capsys: pytest.C
 def test_a_file_that_it_has_not_written_is_not_replaced(arm: Path, name: str, capsys: pytest.CaptureFixture[str]) -> None:
     arm.with_name(name).write_text("mine")
     assert learned(arm, "--transitions", "3") == 2
-    assert f"{name} exists and would be replaced" in capsys.readouterr().err
+    assert f"{name} exists, although there is no" in capsys.readouterr().err
     assert contents(arm.parent) == {"arm.urdf": ARM.encode(), name: b"mine"}
 
 
-def test_the_robot_file_that_it_reads_is_not_replaced(arm: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_robot_file_that_it_reads_is_not_replaced(arm: Path) -> None:
     assert learned(arm, "--transitions", "3") == 0
+    robot = arm.with_name("out.xml")
+    robot.write_text(mine := robot.read_text() + "<!-- mine -->\n")
+    assert learned(arm, "--transitions", "6", "--robot", str(robot)) == 0
+    assert robot.read_text() == mine
+
+
+@pytest.mark.parametrize("edit", [("A curious", "My"), ("[services.monitor]", "# no page"), ("title", "}")])
+def test_an_edited_scenario_is_kept_and_named(arm: Path, edit: tuple[str, str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert learned(arm, "--transitions", "3") == 0
+    scenario = arm.with_name("out.toml")
+    scenario.write_text(mine := "# mine\n" + scenario.read_text().replace(*edit))
+    capsys.readouterr()
+    assert learned(arm, "--transitions", "6") == 0
+    assert scenario.read_text() == mine
+    assert capsys.readouterr().err == f"{scenario} was edited, and is kept as it is.\n"
+
+
+def test_files_whose_meaning_was_not_edited_are_kept_silently(arm: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert learned(arm, "--transitions", "3") == 0
+    robot, scenario = arm.with_name("out.xml"), arm.with_name("out.toml")
+    robot.write_text(robot.read_text() + "<!-- mine -->\n")
+    scenario.write_text(scenario.read_text() + "# mine\n")
+    before = [robot.read_bytes(), scenario.read_bytes()]
+    capsys.readouterr()
+    assert learned(arm, "--transitions", "6") == 0
+    assert capsys.readouterr().err == "" and [robot.read_bytes(), scenario.read_bytes()] == before
+
+
+@pytest.mark.parametrize("edit", [('home="0"', 'home="5"', "out.xml was edited"), ("<", "", "out.xml")])
+def test_an_edited_robot_is_refused_and_kept(arm: Path, edit: tuple[str, str, str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert learned(arm, "--transitions", "3") == 0
+    robot = arm.with_name("out.xml")
+    robot.write_text(robot.read_text().replace(*edit[:2]))
     before = contents(arm.parent)
-    assert learned(arm, "--transitions", "6", "--robot", str(arm.with_name("out.xml"))) == 2
-    assert "would replace this file: give --store another name" in capsys.readouterr().err
+    capsys.readouterr()
+    assert learned(arm, "--transitions", "6") == 2
+    said = capsys.readouterr().err
+    assert edit[2] in said and said.count("\n") == 1
     assert contents(arm.parent) == before
 
 
