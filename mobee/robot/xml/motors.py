@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -38,10 +38,11 @@ class MotorDraft:
         return value if self.in_metres else float(np.deg2rad(value))
 
 
-def read_motor(node: Node, part: str, count: int) -> MotorDraft:
+def read_motor(node: Node, part: str, before: Collection[MotorDraft]) -> MotorDraft:
     """Return the motor that a <motor> element describes; raises RobotFileError if it is not valid.
 
-    `part`: name of the motor's part. `count`: number of motors, of all parts, before it in the file: its index if the element has no idx.
+    `part`: name of the motor's part. `before`: the motors, of all parts, before it in the file. Their number is in the name of a motor
+    without a name; the number of those in the same part is the index of a motor without idx.
     """
     low, high = node.number("minPos"), node.number("maxPos")
     unit = node.choice("unit", node.optional("unit") or UNITS[0], UNITS, "unit")
@@ -55,10 +56,10 @@ def read_motor(node: Node, part: str, count: int) -> MotorDraft:
     home = node.number("home", min(max(0.0, low), high))
     if not low <= home <= high:
         node.fail("home", f"{home:g} is outside of {low:g} .. {high:g}", "Choose a home between minPos and maxPos")
-    index = node.number("idx", float(count))
+    index = node.number("idx", float(sum(motor.part == part for motor in before)))
     if not index.is_integer() or index < 0:
         node.fail("idx", f"{index:g} is not a whole number from 0 on", "Count the motors of a part from 0")
-    return MotorDraft(node, node.optional("name") or f"{part}_{count}", part, int(index), low, high, home, unit == "m")
+    return MotorDraft(node, node.optional("name") or f"{part}_{len(before)}", part, int(index), low, high, home, unit == "m")
 
 
 def order_motors(motors: Mapping[str, MotorDraft], parts: Iterable[str]) -> list[MotorDraft]:

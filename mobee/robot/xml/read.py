@@ -248,11 +248,12 @@ def _read_part(node: Node, draft: Draft, place: Place) -> Place:
 def _read_motor(node: Node, draft: Draft, place: Place) -> Place:
     if not place.part:
         node.fail("position in the file", "a motor outside of every part", "Move it into a <bodypart>")
-    if node.optional("name") in draft.motors:
-        name = node.text("name")
-        remedy = f'rename one, or write <joint motor="{name}"> without a second <motor> where that one is meant'
-        node.fail("name", f"a second motor {name!r}", f"The first is in line {draft.motors[name].node.line}: {remedy}")
-    motor = read_motor(node, place.part, len(draft.motors))
+    motor = read_motor(node, place.part, draft.motors.values())
+    if motor.name in draft.motors:
+        remedy = f'rename one, or write <joint motor="{motor.name}"> without a second <motor> where that one is meant'
+        if not node.optional("name"):
+            remedy = "give this one a name of its own"
+        node.fail("name", f"a second motor {motor.name!r}", f"The first is in line {draft.motors[motor.name].node.line}: {remedy}")
     draft.motors[motor.name] = motor
     draft.note("motor", motor.name, node)
     return replace(place, motor=motor.name)

@@ -113,6 +113,15 @@ def test_parts_nest_and_motors_follow_their_idx(tmp_path: Path) -> None:
     assert [joint.parent for joint in robot.joints] == [0, 1, 2]
 
 
+def test_an_idx_left_out_counts_the_motors_of_the_part(tmp_path: Path) -> None:
+    one, named = (
+        '<motor minPos="-1" maxPos="1"><joint z="1"/></motor>',
+        '<motor name="elbow" idx="1" minPos="-1" maxPos="1"><joint z="1"/></motor>',
+    )
+    robot = read(tmp_path, f'<bodypart name="torso">{one}{one}</bodypart>', f'<bodypart name="arm">{one}{named}{one}</bodypart>')
+    assert robot.motors == ("torso_0", "torso_1", "arm_2", "elbow", "arm_4")
+
+
 def test_home_left_out_is_zero_or_the_limit_nearest_to_it(tmp_path: Path) -> None:
     robot = read(
         tmp_path,
@@ -203,6 +212,10 @@ BAD = {
     "empty list": ("<constraintList/>", "<constraintlist> constraint: the list is empty"),
     "lone row": ('<constraint a="1" q="0" b="1"/>', "<constraint> position in the file: this tag cannot stand here"),
     "ignored link": ('<ignore first="pan" second="bass"/>', "<ignore> second: unknown link 'bass'. Did you mean 'base'?"),
+    "taken name": (
+        '<motor name="arm_2" minPos="0" maxPos="1"><joint z="1"/></motor><motor minPos="0" maxPos="1"/>',
+        "a second motor 'arm_2'",
+    ),
     "double idx": ('<motor name="t" idx="0" minPos="0" maxPos="1"><joint z="1"/></motor>', "<motor> idx: 0 is taken by 'pan'"),
 }
 
