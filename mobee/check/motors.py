@@ -9,7 +9,7 @@ import numpy as np
 
 from mobee.check.interface import Finding, Subject, count, interval, motor_interval, position, some
 from mobee.control.gains import Gains
-from mobee.robot.motor_units import motor_units, outside_zones
+from mobee.robot.motor_units import in_metres, motor_units, outside_zones
 from mobee.robot.robot import Motor
 
 TURN = 2 * np.pi + 1e-6  # rad
@@ -218,7 +218,8 @@ def _change(subject: Subject, motor: Motor, home: float) -> str:
     if subject.is_mjcf:
         return f"{motor.name} {home:.6g} in the qpos of a keyframe home"
     if not subject.is_urdf:
-        return f'{motor.name} home="{np.rad2deg(home):.6g}" (line {line})'
+        value = home if in_metres(subject.robot, motor) else np.rad2deg(home)
+        return f'{motor.name} home="{value:.6g}" (line {line})'
     index, scale, offset = motor.joints[0]
     return f'<joint name="{subject.robot.joints[index].name}" value="{scale * home + offset:.6g}"/> (line {line})'
 

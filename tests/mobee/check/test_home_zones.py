@@ -9,7 +9,7 @@ import pytest
 
 from mobee.check import Finding, check_file, check_robot
 from mobee.robot.load import load_robot
-from tests.mobee.check.arm import LINE, arm, with_joint, with_motor
+from tests.mobee.check.arm import LINE, SLIDE, arm, with_joint, with_motor
 from tests.mobee.robot.urdf_files import ARM, srdf_file, urdf_file
 
 
@@ -25,6 +25,12 @@ def test_a_home_in_a_limit_zone_is_noted_with_its_line_and_the_nearest_that_stay
     assert finding.what == f"home lies in the limit zone of 1 motor: bend at {home} deg"
     assert f'bend home="{better}" (line {LINE["bend"]})' in finding.remedy
     assert found(check_robot(arm(tmp_path, ('home="30"', f'home="{better}"')))) == []
+
+
+def test_the_nearest_home_of_a_slide_is_in_metres(tmp_path: Path) -> None:
+    (finding,) = found(check_robot(arm(tmp_path, *SLIDE, ('home="0.1"', 'home="0.002"'))))
+    assert finding.what == "home lies in the limit zone of 1 motor: bend at 2 mm"
+    assert f'bend home="0.01" (line {LINE["bend"]})' in finding.remedy
 
 
 def test_how_far_the_robot_is_pushed_is_as_much_as_it_rests_from_home(tmp_path: Path) -> None:
