@@ -12,6 +12,7 @@ from mobee.arrays import Array
 from mobee.check.interface import Finding, Subject, some
 from mobee.control.gains import Gains
 from mobee.control.law import stack_clauses
+from mobee.robot.motor_units import in_metres
 from mobee.robot.robot import Clause
 
 ROUNDING = np.deg2rad(0.01)  # rad: tolerance for the digits of a file
@@ -52,9 +53,9 @@ def _impossible(subject: Subject, index: int, most: Array) -> Finding:
         "error",
         "constraint",
         subject.where("clause", str(index)),
-        f"{_name(subject, index)} cannot be satisfied within the limits: a.q + b reaches {_degrees(most.max())} at most",
+        f"{_name(subject, index)} cannot be satisfied within the limits: a.q + b reaches {_text(subject, index, most.max())} at most",
         "the controller would push indefinitely against the limits",
-        'check the sign: a row is satisfied when a.q + b > 0, and negate="true" flips it; b is in degrees',
+        'check the sign: a row is satisfied when a.q + b > 0, and negate="true" flips it; b is in degrees, or in m for motors in m',
     )
 
 
@@ -64,7 +65,7 @@ def _violated_at_home(subject: Subject, index: int) -> Finding:
         "warning",
         "constraint",
         subject.where("clause", str(index)),
-        f"home violates {_name(subject, index)}: a.q + b is {_degrees((clause.a @ home + clause.b).max())} there",
+        f"home violates {_name(subject, index)}: a.q + b is {_text(subject, index, (clause.a @ home + clause.b).max())} there",
         "the controller pushes the robot away from home from the first tick on",
         "move the home or correct the constraint (it is satisfied where a.q + b > 0)",
     )
@@ -75,8 +76,8 @@ def _pushed_at_home(subject: Subject, index: int, value: float) -> Finding:
         "note",
         "constraint",
         subject.where("clause", str(index)),
-        f"home lies near the boundary of {_name(subject, index)}: a.q + b is {_degrees(value)} there",
-        f"the default gains push within {_degrees(Gains.default().constraint_width)} of it: the robot does not rest at home",
+        f"home lies near the boundary of {_name(subject, index)}: a.q + b is {_text(subject, index, value)} there",
+        f"the default gains push within {_text(subject, index, Gains.default().constraint_width)} of it: the robot does not rest at home",
         "nothing, if that is intended; else move the home",
     )
 
@@ -92,9 +93,9 @@ def _idle_rows(subject: Subject, index: int, least: Array, most: Array) -> Itera
             "note",
             "constraint",
             where,
-            f"{name} is satisfied in every pose within the limits: a.q + b is never below {_degrees(least.max())}",
+            f"{name} is satisfied in every pose within the limits: a.q + b is never below {_text(subject, index, least.max())}",
             "it excludes nothing; at most it pushes near its boundary",
-            "remove it, or check sign and unit (degrees)",
+            "remove it, or check sign and unit (degrees, or m for motors in m)",
         )
         return
     for row in np.flatnonzero(most <= 0):
@@ -102,9 +103,9 @@ def _idle_rows(subject: Subject, index: int, least: Array, most: Array) -> Itera
             "note",
             "constraint",
             where,
-            f"row {row + 1} of {name} is satisfied in no pose within the limits: a.q + b stays below {_degrees(most[row])}",
+            f"row {row + 1} of {name} is satisfied in no pose within the limits: a.q + b stays below {_text(subject, index, most[row])}",
             "the other rows decide alone",
-            "remove the row, or check sign and unit (degrees)",
+            "remove the row, or check sign and unit (degrees, or m for motors in m)",
         )
 
 
@@ -129,8 +130,10 @@ def _name(subject: Subject, index: int) -> str:
     return f"the constraint on {some(motors)}"
 
 
-def _degrees(value: float) -> str:
-    return f"{np.rad2deg(value):.4g} deg"
+def _text(subject: Subject, index: int, value: float) -> str:
+    """Return a value of a.q + b, or of its change, as text: in degrees, or in m if all motors of the clause are in m."""
+    motors = [subject.robot.motor_table[column] for column in np.flatnonzero(subject.robot.clauses[index].a.any(axis=0))]
+    return f"{value:.4g} m" if all(in_metres(subject.robot, motor) for motor in motors) else f"{np.rad2deg(value):.4g} deg"
 
 
 CHOICES = 64  # combinations of one row of each clause that are tried, after those that nearly hold

@@ -21,7 +21,7 @@ from mobee.model.contact import Contact
 from mobee.model.model import Model
 from mobee.model.world import World
 from mobee.robot.mjcf.compiled import is_mjcf
-from mobee.robot.motor_units import slides
+from mobee.robot.motor_units import in_metres
 from mobee.robot.robot import Motor, Robot, Shape
 from mobee.robot.xml.node import read_xml
 
@@ -202,7 +202,7 @@ def interval(limits: Array, kind: str) -> str:
 
 def motor_interval(robot: Robot, motor: Motor) -> str:
     """Return the limits of a motor as text for a message, in degrees or, for a motor that slides, in m."""
-    return interval(motor.limits, "prismatic" if _in_metres(robot, motor) else "revolute")
+    return interval(motor.limits, "prismatic" if in_metres(robot, motor) else "revolute")
 
 
 def position(robot: Robot, motor: Motor, value: float) -> str:
@@ -210,12 +210,7 @@ def position(robot: Robot, motor: Motor, value: float) -> str:
 
     `value`: rad or m.
     """
-    return f"{1e3 * value:.3g} mm" if _in_metres(robot, motor) else f"{np.rad2deg(value):.3g} deg"
-
-
-def _in_metres(robot: Robot, motor: Motor) -> bool:
-    """Return whether the unit of a motor is m: it drives a sliding joint with scale 1."""
-    return slides(robot, motor) and any(scale == 1.0 for _, scale, _ in motor.joints)
+    return f"{1e3 * value:.3g} mm" if in_metres(robot, motor) else f"{np.rad2deg(value):.3g} deg"
 
 
 def length(metres: float) -> str:

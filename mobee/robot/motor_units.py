@@ -26,6 +26,11 @@ def slides(robot: Robot, motor: Motor) -> bool:
     return bool(motor.joints) and all(robot.joints[joint].kind == "prismatic" for joint, _, _ in motor.joints)
 
 
+def in_metres(robot: Robot, motor: Motor) -> bool:
+    """Return whether the position of a motor is in m: it moves prismatic joints only, and one of them exactly as far as itself."""
+    return slides(robot, motor) and any(abs(scale) == 1.0 for _, scale, _ in motor.joints)
+
+
 def unit_name(robot: Robot, motor: Motor) -> str:
     """Return the name of the unit of the motor's position: "m" for a motor that slides, "rad" for all others."""
     return "m" if slides(robot, motor) else "rad"

@@ -190,10 +190,10 @@ class Camera:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Clause:
-    """A condition on motor positions q [rad]: a.q + b > 0 must hold for at least one of its rows (thesis eqs. 5.14 to 5.17).
+    """A condition on motor positions q [rad or m]: a.q + b > 0 must hold for at least one of its rows (thesis eqs. 5.14 to 5.17).
 
-    All clauses of a robot should hold. `part`: name of the part whose motors it limits. `a`: (rows, n) factors, as in the file. `b`:
-    (rows,) rad; the file has degrees.
+    All clauses of a robot should hold. `part`: name of the part whose motors it limits. `a`: (rows, n) factors. `b`: (rows,) rad, or m in
+    a row whose motors are all in m.
     """
 
     part: str

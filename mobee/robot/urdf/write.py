@@ -164,7 +164,7 @@ def _comment(robot: Robot) -> str:
     elif any(body.inertia is None for body in robot.bodies):
         lines.append('Where <mobee assumed="true"/> stands only the mass is known; the moments of inertia are those of a ball of water.')
     if robot.clauses:
-        lines.append("Not in this file: at least one row of every clause holds, a.q + b > 0 in rad.")
+        lines.append("Not in this file: at least one row of every clause holds, a.q + b > 0 in rad and m.")
     for index, clause in enumerate(robot.clauses):
         rows = []
         for row, offset in zip(clause.a, clause.b, strict=True):

@@ -121,13 +121,14 @@ def _motor(draft: MotorDraft, joints: tuple[tuple[int, float, float], ...]) -> M
     return motor
 
 
-def read_clauses(node: Node, part: Part, motors: Sequence[str]) -> Clause:
+def read_clauses(node: Node, part: Part, motors: Sequence[MotorDraft]) -> Clause:
     """Return the clause of a <constraintList>: a condition on motor positions q, which is met if at least one of its rows holds.
 
     A row holds if a.q + b > 0 or, with the attribute `negate`, if a.q + b < 0. The attribute `q` of a row contains the names of motors of
-    the part, or their indices in the part, from 0. `motors`: the names of all motors of the robot, in the order of q. Raises RobotFileError
-    if the element is not valid.
+    the part, or their indices in the part, from 0. In the file each position is in the unit of its motor, and `b` in degrees, or in m if
+    all motors of the row are in m. `motors`: all motors of the robot, in the order of q. Raises RobotFileError if the element is not valid.
     """
+    names, in_metres = [motor.name for motor in motors], np.array([motor.in_metres for motor in motors])
     rows, offsets = [], []
     for child in (child for child in node if child.tag == "constraint"):
         factors, words = child.numbers("a"), child.words("q")
@@ -135,12 +136,16 @@ def read_clauses(node: Node, part: Part, motors: Sequence[str]) -> Clause:
             child.fail("q", f"names {len(words)} motors for {len(factors)} factors", "Give a and q the same number of entries")
         row = np.zeros(len(motors))
         for factor, word in zip(factors, words, strict=True):
-            row[motors.index(_motor_name(child, word, part))] += factor
+            row[names.index(_motor_name(child, word, part))] += factor
         if not row.any():
             child.fail("a", "is zero", "Give at least one motor a factor")
+        offset = child.number("b")
+        if (row[~in_metres] != 0.0).any():  # from degrees to rad
+            row[in_metres] = np.deg2rad(row[in_metres])
+            offset = np.deg2rad(offset)
         sign = -1.0 if child.flag("negate") else 1.0
         rows.append(sign * row)
-        offsets.append(sign * np.deg2rad(child.number("b")))
+        offsets.append(sign * offset)
     if not rows:
         node.fail("constraint", "the list is empty", "Add a <constraint> or remove the list")
     return Clause(part.name, np.array(rows), np.array(offsets))

@@ -80,7 +80,6 @@ def _own_robot(root: Node, draft: Draft, name: str) -> Robot:
             draft.parts[part][0].fail("motor", f"part {part!r} has no motor", "Add a <motor> or move its links into another part")
         parts[part] = Part(part, names, next(k for k, motor in enumerate(motors) if motor.part == part))
     joints, table = finish_joints(draft.joints, draft.drives, motors)
-    names = tuple(motor.name for motor in table)
     field_pairs, solid_pairs, untested = _pairs(root, draft, joints)
     return Robot(
         name=name,
@@ -90,7 +89,7 @@ def _own_robot(root: Node, draft: Draft, name: str) -> Robot:
         parts=parts,
         markers=draft.markers,
         shapes=tuple(draft.shapes),
-        clauses=tuple(read_clauses(node, parts[part], names) for part, node in draft.constraints),
+        clauses=tuple(read_clauses(node, parts[part], motors) for part, node in draft.constraints),
         field_pairs=field_pairs,
         solid_pairs=solid_pairs,
         base_shapes=frozenset(draft.base_shapes),

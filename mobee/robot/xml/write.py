@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterable
 from pathlib import Path
 from xml.etree import ElementTree as ET
@@ -13,7 +14,7 @@ import numpy as np
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
 from mobee.robot.bodies import to_six
-from mobee.robot.motor_units import slides
+from mobee.robot.motor_units import in_metres
 from mobee.robot.robot import Body, Clause, Joint, MeshSource, Motor, Robot, Shape
 from mobee.robot.urdf.mesh import mesh_name
 from mobee.robot.writing import Drive, degrees, drives_of, number, numbers
@@ -80,20 +81,28 @@ def _motor(robot: Robot, motor: Motor) -> ET.Element:
     low, high = motor.limits
     values = {"minPos": low, "maxPos": high, "home": min(max(motor.home, low), high)}
     values |= {"velocity": motor.max_velocity, "acceleration": motor.max_acceleration}
-    in_metres = slides(robot, motor) and any(abs(scale) == 1.0 for _, scale, _ in motor.joints)
-    texts = {"unit": "m"} if in_metres else {}
-    texts |= {name: (number if in_metres else degrees)(value) for name, value in values.items()}
+    texts = {"unit": "m"} if in_metres(robot, motor) else {}
+    texts |= {name: (number if texts else degrees)(value) for name, value in values.items()}
     zone = {"zoneEndsAtHome": "true"} if motor.zone_ends_at_home else {}
     return ET.Element("motor", {"name": motor.name} | texts | {"torque": number(motor.max_torque)} | zone)
 
 
 def _clause(robot: Robot, clause: Clause) -> ET.Element:
+    """Write a clause: positions and offset in degrees, those of motors in metres in m."""
+    metres = np.array([in_metres(robot, motor) for motor in robot.motor_table])
     element = ET.Element("constraintList")
     for row, offset in zip(clause.a, clause.b, strict=True):
         used = np.flatnonzero(row)
-        names = " ".join(robot.motors[k] for k in used)
-        ET.SubElement(element, "constraint", a=numbers(row[used]), q=names, b=degrees(offset))
+        names = " ".join(_clause_name(robot, k, clause.part) for k in used.tolist())
+        factors, text = (row, number) if metres[used].all() else (np.where(metres, np.rad2deg(row), row), degrees)
+        ET.SubElement(element, "constraint", a=numbers(factors[used]), q=names, b=text(offset))
     return element
+
+
+def _clause_name(robot: Robot, motor: int, part: str) -> str:
+    """Return the motor's name, or its index in the part where a list of motors would not be read with its name."""
+    name = robot.motors[motor]
+    return str(motor - robot.parts[part].start) if re.search(r"[\s,]|^-?[0-9]+$", name) else name
 
 
 def _write_link(robot: Robot, drives: tuple[Drive, ...], into: ET.Element, link: int, point: Array, path: Path) -> None:

@@ -31,6 +31,8 @@ ARM = """\
 </bodypart>"""
 LINE = {"upper": 6, "fore": 9, "tip": 10, "pan": 4, "bend": 7}  # in the file
 
+SLIDE = (('minPos="10" maxPos="100" home="30"', 'unit="m" minPos="0" maxPos="0.2" home="0.1"'), ('y="-1"', 'type="prismatic" y="-1"'))
+
 
 def arm(folder: Path, *changes: tuple[str, str]) -> Robot:
     """The arm, with texts replaced; each must be there."""

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.mobee.check.arm import arm, named
+from tests.mobee.check.arm import SLIDE, arm, named
 
 
 def clauses(folder: Path, *lists: str) -> list[str]:
@@ -26,6 +26,15 @@ def test_constraints_that_can_be_satisfied_and_can_be_violated_are_none(tmp_path
 def test_a_constraint_beyond_the_limits_is_an_error(tmp_path: Path) -> None:
     (said,) = clauses(tmp_path, row("1", -100))
     assert said == "error: the constraint on pan cannot be satisfied within the limits: a.q + b reaches -10 deg at most"
+
+
+def test_a_constraint_on_a_slide_is_judged_and_written_in_metres(tmp_path: Path) -> None:
+    text = '<constraintList><constraint a="{}" q="bend" b="{}"/></constraintList></bodypart>'
+    for factor, offset, said in ((-1, 0.15, "home lies near"), (1, -0.15, "home violates"), (1, -0.3, "cannot be satisfied")):
+        robot = arm(tmp_path, *SLIDE, ("</bodypart>", text.format(factor, offset)))
+        (finding,) = named(robot, "constraint")
+        assert said in finding.what
+        assert f" {(0.2 if said.startswith('cannot') else factor * 0.1) + offset:.4g} m " in finding.what
 
 
 def test_home_in_violation_is_found(tmp_path: Path) -> None:

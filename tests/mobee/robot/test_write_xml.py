@@ -14,6 +14,7 @@ from mobee.errors import InvalidValue, RobotFileError
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Body, Joint, Marker, Motor, Part, Robot, Shape
 from mobee.robot.xml.write import write_xml
+from tests.mobee.robot.robot_files import robot_file
 from tests.mobee.robot.same_robot import assert_same_robot
 from tests.mobee.robot.urdf_files import foreign
 
@@ -186,6 +187,21 @@ def test_a_slide_is_written_in_metres(tmp_path: Path) -> None:
     assert again.limits.tolist() == robot.limits.tolist() == [[0.01, 0.04]]
     assert again.motor_table[0].joints == robot.motor_table[0].joints
     assert again.motor_table[0].max_velocity == 0.2
+
+
+@pytest.mark.parametrize("names", [("pan", "slide"), ("1", "0"), ("7", "left slide"), ("a,b", "-1")])
+def test_constraints_are_read_back_with_motors_in_metres_and_names_that_are_no_words(tmp_path: Path, names: tuple[str, str]) -> None:
+    path = robot_file(
+        tmp_path,
+        f'<bodypart name="lift"><motor name="{names[0]}" minPos="-90" maxPos="90"><joint name="a" z="1"/></motor>',
+        f'<motor name="{names[1]}" unit="m" minPos="0" maxPos="0.2"><joint name="b" type="prismatic" z="1"/></motor><constraintList>',
+        '<constraint a="2" q="0" b="30"/><constraint a="-1" q="1" b="0.15"/><constraint a="-1 -100" q="0 1" b="20"/></constraintList>',
+        "</bodypart>",
+    )
+    robot = load_robot(path)
+    (clause,), (again,) = robot.clauses, read_back(robot, tmp_path).clauses
+    assert np.abs(clause.a - again.a).max() < 1e-12
+    assert np.abs(clause.b - again.b).max() < 1e-12
 
 
 def test_an_unknown_unit_of_a_motor_is_refused(tmp_path: Path) -> None:

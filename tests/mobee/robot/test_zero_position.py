@@ -147,6 +147,21 @@ def test_a_constraint_list_is_a_clause_in_radians_over_the_whole_motor_vector(tm
     assert clause.part == "arm"
 
 
+def test_a_constraint_counts_motors_in_metres_in_metres(tmp_path: Path) -> None:
+    robot = read(
+        tmp_path,
+        '<bodypart name="lift"><motor name="pan" minPos="-90" maxPos="90"><joint z="1"/></motor>',
+        '<motor name="slide" unit="m" minPos="0" maxPos="0.2"><joint type="prismatic" z="1"/></motor>',
+        '<constraintList><constraint a="-1" q="slide" b="0.15"/></constraintList>',  # slide < 0.15 m
+        '<constraintList><constraint a="-1 -100" q="pan slide" b="20"/></constraintList></bodypart>',  # pan [deg] + 100 slide [m] < 20
+    )
+    pan, slide = np.deg2rad(12.0), 0.1
+    inside, outside = np.array([pan, slide - 0.021]), np.array([pan, slide - 0.019])
+    single, mixed = robot.clauses
+    assert (single.a @ [0.0, 0.149] + single.b, single.a @ [0.0, 0.151] + single.b) == pytest.approx((0.001, -0.001))
+    assert (mixed.a @ inside + mixed.b, mixed.a @ outside + mixed.b) == pytest.approx((np.deg2rad(0.1), np.deg2rad(-0.1)))
+
+
 def test_a_marker_has_a_right_handed_orientation_whose_z_is_its_normal(tmp_path: Path) -> None:
     marker = read(tmp_path, *ARM).markers["tip"]
     np.testing.assert_allclose(marker.normal, [-1, 0, 0])
