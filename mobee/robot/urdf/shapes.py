@@ -82,7 +82,7 @@ class ShapeReader:
             node.fail("size of the file", f"more than {MOST_SHAPES} shapes", "Join small shapes, or leave out what nothing can touch")
         base = link == 0
         if note is not None:
-            note.check_attributes({"field", "part", "base"})
+            note.check_attributes({"field", "part", "base", "capsule"})
             part = note.choice("part", note.optional("part") or part, self.parts, "part")
             base = note.flag("base", default=base)
         place = frame @ read_origin(node)
@@ -159,24 +159,31 @@ def _length(form: Node, name: str) -> float:
 
 
 def _capsules(found: list[Found]) -> list[Found]:
-    """Replace each cylinder with a sphere of its radius at both ends by a capsule, for which URDF has no element."""
+    """Replace each solid cylinder with a sphere of its radius at both ends by a capsule, for which URDF has no element.
+
+    Of several spheres at one end, the one that `write_urdf` named after the cylinder is taken. A cylinder with <mobee capsule="false"/>
+    remains one.
+    """
+    spheres = [k for k, one in enumerate(found) if one.shape.kind == "sphere" and one.shape.role == "solid"]
+    if len(spheres) < 2:
+        return found
     caps: set[int] = set()
     merged = list(found)
-    for role in ("solid", "field"):
-        spheres = [k for k, one in enumerate(found) if one.shape.kind == "sphere" and one.shape.role == role]
-        if len(spheres) < 2:
+    balls = np.array([[*found[k].shape.position, found[k].shape.size[0]] for k in spheres])
+    for k, one in enumerate(found):
+        if one.shape.kind != "cylinder" or one.shape.role != "solid":
             continue
-        balls = np.array([[*found[k].shape.position, found[k].shape.size[0]] for k in spheres])
-        for k, one in enumerate(found):
-            if one.shape.kind != "cylinder" or one.shape.role != role:
-                continue
-            radius, height = one.shape.size
-            half = height / 2.0 * one.shape.rotation[:, 2]
-            ends = [np.append(one.shape.position + side * half, radius) for side in (1.0, -1.0)]
-            at_ends = [np.flatnonzero(np.abs(balls - end).max(axis=1) < CLOSE) for end in ends]
-            if len(at_ends[0]) and len(at_ends[1]):
-                caps |= {spheres[at_ends[0][0]], spheres[at_ends[1][0]]}
-                merged[k] = replace(one, shape=replace(one.shape, kind="capsule"))
+        note = child(one.node, "mobee")
+        if note is not None and not note.flag("capsule", default=True):
+            continue
+        radius, height = one.shape.size
+        half = height / 2.0 * one.shape.rotation[:, 2]
+        ends = [np.append(one.shape.position + side * half, radius) for side in (1.0, -1.0)]
+        at_ends = [[spheres[ball] for ball in np.flatnonzero(np.abs(balls - end).max(axis=1) < CLOSE)] for end in ends]
+        if all(at_ends):
+            names = [f"{one.shape.name}_cap_{side}" for side in (0, 1)]
+            caps |= {min(here, key=lambda ball: found[ball].shape.name != name) for here, name in zip(at_ends, names, strict=True)}
+            merged[k] = replace(one, shape=replace(one.shape, kind="capsule"))
     return [one for k, one in enumerate(merged) if k not in caps]
 
 

@@ -49,7 +49,7 @@ class GeometryWriter:
 
         `point`: (3,) m, origin of the link's frame in the root frame. `note`: attributes that URDF does not have; they are written in an
         element <mobee>, if there are any: "part", the name of the shape's part, and "base", "true" if the shape is never tested against
-        world objects, else "false".
+        world objects, else "false"; "capsule", "false" if spheres at its ends make no capsule of a cylinder.
         """
         for name, part in _parts(shape):
             geometry = self._geometry(part)
@@ -176,12 +176,15 @@ def _comment(robot: Robot) -> str:
 
 def _write_body(robot: Robot, link: ET.Element, index: int, point: Array, part: str, writer: GeometryWriter) -> None:
     link.extend(inertial_element(body, point) for body in robot.bodies if body.link == index)
+    balls = {(shape.link, shape.size[0]) for shape in robot.shapes if shape.kind == "sphere"}
     for k, shape in enumerate(robot.shapes):
         if shape.link != index:
             continue
         note = {} if shape.part == part else {"part": shape.part}
         if (k in robot.base_shapes) != (index == 0):
             note["base"] = "true" if index else "false"
+        if shape.kind == "cylinder" and shape.role == "solid" and (index, shape.size[0]) in balls:
+            note["capsule"] = "false"
         write = writer.field if shape.role == "field" else writer.solid
         write(link, shape, point, note)
 

@@ -17,6 +17,7 @@ from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
 from mobee.robot.urdf.write import write_urdf
 from mobee.robot.xml.write import write_xml
+from tests.mobee.robot.robot_files import robot_file
 from tests.mobee.robot.same_robot import assert_same_robot
 from tests.mobee.robot.test_write_xml import random_robot
 from tests.mobee.robot.urdf_files import foreign
@@ -55,6 +56,21 @@ def test_any_robot_is_read_back_as_it_was(tmp_path: Path, seed: int) -> None:
     robot = random_robot(seed, 1.0)
     written = read_back(robot, tmp_path)
     assert_same_robot(robot, written)
+
+
+def test_capsules_that_meet_and_cylinders_with_spheres_remain_what_they_are(tmp_path: Path) -> None:
+    path = robot_file(
+        tmp_path,
+        '<bodypart name="arm"><motor name="pan" minPos="-90" maxPos="90"><joint z="1">',
+        '<sphere name="knob" radius="0.02"/><capsule name="a" radius="0.02" height="0.2" px="-0.1" hx="1"/>',
+        '<capsule name="b" radius="0.02" height="0.2" px="-0.3" hx="1"/><sphere name="s" radius="0.02"/>',
+        '<cylinder name="c" radius="0.02" height="0.4" px="-0.2" hx="1"/>',
+        '<cylinder name="f" radius="0.02" height="0.4" px="-0.2" field="true"/>',
+        '<sphere name="g" radius="0.02" px="-0.2" py="0.2" field="true"/><sphere name="h" radius="0.02" px="-0.2" py="-0.2" field="true"/>',
+        "</joint></motor></bodypart>",
+    )
+    robot = load_robot(path)
+    assert_same_robot(robot, read_back(robot, tmp_path))
 
 
 def test_coupled_motors_are_mimic_joints_and_markers_fixed_links(tmp_path: Path) -> None:
