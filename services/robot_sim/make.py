@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from mobee.robot.robot import Robot
@@ -47,16 +49,17 @@ def motor_parameters(config: Config, robot: Robot) -> MotorParameters:
 def _make_backend(config: Config, robot: Robot) -> Backend:
     parameters, robot = motor_parameters(config, robot), with_torques(robot, config.torques)
     chosen, dt = choose(config.backend, robot).name, round(1e9 / config.rate) / 1e9
+    load_world = partial(copy, config.load_world())  # once: a reset restores it, although its file may have changed
     if chosen == "kinematic":
-        return KinematicBackend(robot, config.load_world, parameters, config.seed)
+        return KinematicBackend(robot, load_world, parameters, config.seed)
     try:
         if chosen == "mujoco":
             from services.robot_sim.mujoco_backend import MujocoBackend  # optional, as PyBullet
 
-            return MujocoBackend(robot, config.load_world, parameters, config.seed, dt)
+            return MujocoBackend(robot, load_world, parameters, config.seed, dt)
         from services.robot_sim.bullet import BulletBackend  # which not every Python has
 
-        return BulletBackend(robot, config.load_world, parameters, config.seed, dt)
+        return BulletBackend(robot, load_world, parameters, config.seed, dt)
     except ModuleNotFoundError as error:
         raise BackendUnavailable(
             f'backend = "{chosen}" needs the module {error.name!r}: pip install "mobee[{EXTRA}]". Without it: backend = "kinematic".'

@@ -2,11 +2,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
 
 from mobee.errors import InvalidValue, UnknownName
+from mobee.model.world_file import WORLDS
 from mobee.robot.load import load_robot
 from mobee.simulation.motors import MotorParameters
 from services.robot_sim.config import Config
@@ -36,3 +39,19 @@ def test_a_robot_whose_motors_were_not_identified_is_refused() -> None:
 def test_encoder_errors_are_finite_errors_of_motors(errors: dict[str, float], error: type[Exception], text: str) -> None:
     with pytest.raises(error, match=text):
         Config(backend="kinematic", encoder_errors=errors).check_robot(load_robot("icub"))
+
+
+@pytest.mark.parametrize("name", ["kinematic", "pybullet", "mujoco"])
+def test_a_reset_restores_the_world_of_the_start_although_its_file_has_changed(
+    tmp_path: Path, name: Literal["kinematic", "pybullet", "mujoco"]
+) -> None:
+    if name != "kinematic":
+        pytest.importorskip(name)
+    world = tmp_path / "world.xml"
+    world.write_text((WORLDS / "table.xml").read_text())
+    backend = make_backend(Config(backend=name, world=str(world)), load_robot("icub"))
+    before = backend.world.objects["ball"].position
+    backend.place("ball", (-0.3, 0.3, 0.5))
+    world.write_text("<broken")
+    backend.reset(0)
+    np.testing.assert_array_equal(backend.world.objects["ball"].position, before)
