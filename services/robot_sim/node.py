@@ -11,6 +11,7 @@ from __future__ import annotations
 import secrets
 import time
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Literal, NoReturn
 
@@ -125,7 +126,10 @@ class Node:
                 self._tick_locked(lockstep)
                 wait = self._period if lockstep.is_degraded() else self._dt * self._pace
                 if wait:
-                    self._service.spin(now + wait)
+                    self._service.spin(now + wait, partial(self._has_changed, self._pace, self._bus.run))
+
+    def _has_changed(self, pace: float, run: str) -> bool:
+        return (self._pace, self._bus.run) != (pace, run)
 
     def _tick_locked(self, lockstep: Lockstep) -> None:
         begin = time.monotonic()
@@ -200,6 +204,7 @@ class Node:
         self._watch.mark(self._rate.missed)
 
     def _reset(self, request: Empty, key: str) -> Done:
+        self._require_pauser(request.who)
         self._backend.reset(self._config.seed)
         self._bus.run, self._bus.k, self._bus.t = _new_run(), 0, 0
         self._guard.reset()
@@ -217,6 +222,7 @@ class Node:
         self._require_pauser(request.who)
         if self._pause is None:
             self._guard.hold_all(f"paused by {request.who}")
+            self._sensors.note_hold(self._guard.gates)
             self._note_disturbance("paused")
             self._publish_tick("paused")
         self._pause = Pause(request.who, time.monotonic() + MAX_PAUSE)
@@ -232,7 +238,7 @@ class Node:
         """Refuse a call of another service than the one that has paused the robot, while that one runs."""
         pause = self._pause
         if pause is not None and who != pause.by and self._service.alive.get(pause.by):
-            raise CallRefused("owned", f"{pause.by} has paused the robot, and only it can resume the robot while it runs")
+            raise CallRefused("owned", f"{pause.by} has paused the robot, and only it can resume or reset the robot while it runs")
 
     def _is_paused(self) -> bool:
         """Return whether time stands still; a pause that was forgotten ends by itself."""

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Literal
 
 import numpy as np
+from msgspec.structs import replace
 
 from bus_schema import VERSION
 from bus_schema.messages import PartStatus, State, Tick
@@ -156,6 +157,17 @@ class Sensors:
         """
         if len(self._statuses) == len(self._where):
             self._tick.put(dt=dt, mode=mode, rate=rate, q=self._q.tolist(), parts=self._statuses)
+
+    def note_hold(self, gates: Mapping[str, Gate]) -> None:
+        """Set the present state of each part's safety gate in the part's newest status, without a command: all parts have just been held.
+
+        `gates`: the safety gate of each part.
+        """
+        for part, status in self._statuses.items():
+            gate = gates[part]
+            self._statuses[part] = replace(
+                status, mode="hold", gate=gate.state, faults=gate.faults, epoch=gate.epoch, cmd_seq=-1, cmd_age=-1
+            )
 
     def digest(self) -> None:
         """Add the samples (readings of the parts' motors) of this tick to the SHA-256 of the run, `hash`."""

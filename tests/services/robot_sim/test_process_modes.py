@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from bus_schema import keys
-from bus_schema.messages import EStop
+from bus_schema.messages import EStop, Tick
 from bus_schema.rpc import Done, Driven, Empty, Reply, Request, Take, Taken, WithEpoch
 from mobee.model.masses import gravity_torque
 from mobee_cli.__main__ import main
@@ -75,10 +75,13 @@ def test_an_emergency_stop_latches_until_it_is_reset(bench: Bench) -> None:
 
 
 def test_while_it_is_paused_no_time_passes_and_afterwards_it_holds(bench: Bench) -> None:
+    ticks = bench.rig.record(Tick)
     epoch = bench.arm("left_arm")
     bench.keep("left_arm", epoch, 0.1, lambda: elbow(0.3))
     bench.rig.call(keys.sim("pause"), Empty, Done)
     wait_for(lambda: bench.clocks[-1].mode == "paused", "the pause")
+    shown = wait_for(lambda: next((tick for tick in tuple(ticks) if tick.mode == "paused"), None), "its tick").parts["left_arm"]
+    assert (shown.gate, shown.mode, shown.epoch, shown.cmd_seq, shown.cmd_age) == ("hold", "hold", epoch, -1, -1)
     k = bench.clocks[-1].k
     time.sleep(0.1)
     assert bench.clocks[-1].k == k
@@ -114,7 +117,7 @@ def test_an_emergency_stop_in_a_pause_is_confirmed_to_mobee_estop(bench: Bench, 
     wait_for(lambda: bench.clocks[-1].mode == "free", "the clock")
 
 
-def test_only_the_client_that_paused_can_resume_while_it_runs(bench: Bench) -> None:
+def test_only_the_client_that_paused_can_resume_or_reset_while_it_runs(bench: Bench) -> None:
     def is_refused(verb: str) -> bool:
         bench.rig.call(keys.sim("pause"), Empty, Done, who="person")
         try:
@@ -128,6 +131,7 @@ def test_only_the_client_that_paused_can_resume_while_it_runs(bench: Bench) -> N
     bench.rig.token("person", "p1")
     wait_for(lambda: is_refused("resume"), "the token of the first is known, and another refused")
     assert is_refused("pause")
+    assert is_refused("reset")
     assert "paused by person, for at most" in bench.rig.stat("robot_sim").text
     bench.rig.drop_token("person", "p1")
 
