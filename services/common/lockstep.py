@@ -96,6 +96,10 @@ class Barrier:
         """Return the expected participants that are not present."""
         return sorted(self._expected - self._present)
 
+    def is_empty(self) -> bool:
+        """Return whether no participant is present, so that no tick waits."""
+        return not self._present
+
     def missing(self, k: int) -> list[str]:
         """Return the names of the present participants that must still answer tick k.
 

@@ -62,8 +62,8 @@ class Lockstep:
         return self._service.bus.k == self._last_tick > 0
 
     def is_degraded(self) -> bool:
-        """Return whether an expected participant is absent; ticks then run in real time."""
-        return bool(self._barrier.absent())
+        """Return whether an expected participant is absent, or nobody takes part; ticks then run in real time."""
+        return bool(self._barrier.absent()) or self._barrier.is_empty()
 
     def note_flaw(self, why: str) -> None:
         """Count an event that makes the run unrepeatable, and report it at most once per second; `why`: text for the report."""

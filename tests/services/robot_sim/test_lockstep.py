@@ -14,7 +14,7 @@ import pytest
 
 from bus_schema import keys
 from bus_schema.messages import Answer, Clock, Command, Commands, Event, Order, State, StepDone
-from bus_schema.rpc import Done, Driven, Empty, Pace, Take, Taken, WithEpoch
+from bus_schema.rpc import Done, Driven, Empty, Pace, Request, Take, Taken, WithEpoch
 from mobee import load_robot
 from services.common.rpc import CallFailed
 from tests.services.harness import Rig, rig, wait_for
@@ -141,6 +141,27 @@ def test_a_pace_lets_each_tick_take_its_time_at_least(bench: Bench) -> None:
         assert time.monotonic() - begin > 0.3
     finally:
         bench.rig.call(keys.sim("pace"), Pace, Done, speed=0.0)
+
+
+@pytest.mark.parametrize("verb, request_type, fields", [("pace", Pace, {"speed": 0.0}), ("reset", Empty, {})])
+def test_a_new_pace_or_run_does_not_wait_for_the_end_of_a_long_tick(
+    bench: Bench, verb: str, request_type: type[Request], fields: dict[str, float]
+) -> None:
+    bench.begin()
+    bench.rig.call(keys.sim("pace"), Pace, Done, speed=1e-9)
+    try:
+        bench.done(1)
+        wait_for(lambda: bench.stat()["speed"] > 0.0, "the answer, after which the tick lasts on")
+        run = bench.clocks[-1].run
+        bench.rig.call(keys.sim(verb), request_type, Done, **fields)
+        wait_for(lambda: bench.k == 2 or bench.clocks[-1].run != run, "the next tick")
+    finally:
+        bench.rig.call(keys.sim("pace"), Pace, Done, speed=0.0)
+
+
+def test_calls_are_answered_while_no_service_takes_part(tmp_path: Path) -> None:
+    with robot_sim(tmp_path) as bench:
+        wait_for(lambda: bench.stat()["tick"] > 0, "a tick")
 
 
 def test_a_command_acts_in_the_tick_after_the_one_it_answers(bench: Bench) -> None:
