@@ -105,7 +105,7 @@ class Explore(Request, frozen=True, kw_only=True):
 
 
 class AddObject(Request, frozen=True, kw_only=True):
-    """Add an object to the world of the service `model`, or replace the one of the same name."""
+    """Add an object to the world of the service `model`, or replace the one of the same name, also one that is attached to a link."""
 
     name: Name
     geometry: Geometry

@@ -184,7 +184,7 @@ class WorldServer:
         known = world.objects.get(seen.name)
         rotation = _rotation(seen.quaternion)
         shape, role = _shape(seen.geometry, margin), self._role_of(seen)
-        if known is not None and known.kind == shape.kind and known.size == shape.size:
+        if known is not None and known.link is None and known.kind == shape.kind and known.size == shape.size:
             world.move(seen.name, position=seen.position, rotation=rotation)
             if known.role != role:
                 world.set_role(seen.name, role)

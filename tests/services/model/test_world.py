@@ -181,6 +181,17 @@ def test_an_attached_object_goes_with_its_link_and_stays_where_it_is_detached(ru
     run.edit("remove", OneName, name="cup")
 
 
+@pytest.mark.parametrize("radius", [0.03, 0.04])
+def test_an_object_that_is_added_replaces_an_attached_one_and_is_free(run: Stage, radius: float) -> None:
+    cup = {"name": "cup", "quaternion": UPRIGHT, "role": "ghost"}
+    run.edit("add", AddObject, geometry=BALL, position=[-0.3, 0.0, 0.2], **cup)
+    run.edit("attach", Attach, name="cup", link="l_hand")
+    run.edit("add", AddObject, geometry=Geometry(kind="sphere", size=[radius]), position=[-0.4, 0.1, 0.2], **cup)
+    found = run.world()["cup"]
+    assert (found.link, found.position, found.geometry.size) == ("", [-0.4, 0.1, 0.2], [radius])
+    run.edit("remove", OneName, name="cup")
+
+
 @pytest.mark.parametrize(
     ("verb", "request_type", "fields", "says"),
     [
