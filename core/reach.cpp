@@ -155,15 +155,16 @@ void add_reaches(const Law& law, View<Reach* const> reaches, double* q, const do
     for (Reach* reach : reaches) {
         place_marker(*reach, q);
         update_error(*reach);
-        bool escapes = false;
         if (law.published) {
             reach::force_motors(*reach);
         } else {
-            escapes = compute_pull(law, *reach, q, dt, total);
+            compute_pull(law, *reach, q, dt, total);
         }
         reach::add_bounded(law, *reach, total);
-        if (!law.published) replace_springs(law, *reach, escapes, q, attractor, total);
     }
+    if (law.published) return;
+    for (Reach* const* reach = reaches.begin(); reach != reaches.end(); ++reach)
+        replace_springs(law, **reach, {reaches.data, reach - reaches.begin()}, q, attractor, total);
 }
 
 bool is_approaching(const Law& law, View<Reach* const> reaches, std::int64_t part) {

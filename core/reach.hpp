@@ -70,6 +70,7 @@ struct Reach {
     double least_distance = 0.0;         // the smallest of these lengths so far [m]
     double time_without_progress = 0.0;  // s, since `least_distance` has decreased
     std::int64_t started = 0;            // whether the state has been initialised
+    std::int64_t escapes = 0;            // whether the last pose was singular and the motors follow `escape`
 
     int rows() const { return turns_normal ? 6 : 3; }
 };
@@ -88,11 +89,12 @@ void place_marker(Reach& reach, const double* q);
 void update_error(Reach& reach);
 
 // Fill the motors' forces of the default law, before they are bounded, for a placed marker.  `other_forces` (n,) act on the motors
-// besides their springs.  Return whether the pose is singular and `escape` was filled.
-bool compute_pull(const Law& law, Reach& reach, double* q, double dt, const double* other_forces);
+// besides their springs.  Set `escapes`, and fill `escape` if it is 1.
+void compute_pull(const Law& law, Reach& reach, double* q, double dt, const double* other_forces);
 
-// Cancel the springs of the pulled motors in `total`.  If `escapes`, add springs towards a point along `escape` in their place.
-void replace_springs(const Law& law, const Reach& reach, bool escapes, const double* q, const double* attractor, double* total);
+// Cancel the springs of the pulled motors in `total`, but not those that a reach `before` has cancelled.  If the reach escapes, add springs
+// towards a point along `escape`.
+void replace_springs(const Law& law, const Reach& reach, View<Reach* const> before, const double* q, const double* attractor, double* total);
 
 // Return whether the marker has not arrived yet and has come nearer recently.
 bool has_progress(const Reach& reach);

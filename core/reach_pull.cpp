@@ -321,9 +321,17 @@ bool find_escape(const Law& law, Reach& reach, double* q, double size) {
     return true;
 }
 
+// Return whether one of the reaches pulls a motor.
+bool is_pulled(View<Reach* const> reaches, std::int64_t motor) {
+    for (const Reach* reach : reaches)
+        for (const PulledMotor& pulled : reach->motors)
+            if (pulled.motor == motor) return true;
+    return false;
+}
+
 }  // namespace pull
 
-bool compute_pull(const Law& law, Reach& reach, double* q, double dt, const double* other_forces) {
+void compute_pull(const Law& law, Reach& reach, double* q, double dt, const double* other_forces) {
     const double remaining = pull::smooth_error(reach, dt);
     pull::compute_descent(reach);
     pull::compute_mobility(law, reach, q);
@@ -335,21 +343,20 @@ bool compute_pull(const Law& law, Reach& reach, double* q, double dt, const doub
     for (const PulledMotor& motor : reach.motors) effective += motor.descent * motor.mobility * motor.descent;
     const bool is_singular = effective < pull::singular_share * pull::singular_share * size * squares;
     const bool needs_escape = is_singular && remaining > pull::tolerance && reach.time_without_progress <= pull::escape_timeout;
-    const bool escapes = needs_escape && pull::find_escape(law, reach, q, size);
+    reach.escapes = needs_escape && pull::find_escape(law, reach, q, size);
     const double fade = remaining / (remaining + 0.5 * pull::tolerance);  // at the target the motors do not follow the encoders' noise
     const double scale = fade / (1.0 + std::sqrt(squares) / pull::saturation_length);
     pull::push_marker(reach, push, size, scale);
     pull::force_motors(reach, push);
     if (pull::is_obstructed(law, reach, q, other_forces)) pull::slide(reach, push, size, scale);
-    return escapes;
 }
 
-void replace_springs(const Law& law, const Reach& reach, bool escapes, const double* q, const double* attractor, double* total) {
+void replace_springs(const Law& law, const Reach& reach, View<Reach* const> before, const double* q, const double* attractor, double* total) {
     for (const PulledMotor& motor : reach.motors) {
         const std::int64_t i = motor.motor;
         const MotorGains& gains = law.motors[i];
-        total[i] -= squash(attractor[i] - q[i], gains.max_spring, gains.spring_knee);
-        if (escapes) total[i] += squash(pull::escape_step * motor.escape * gains.unit, gains.max_spring, gains.spring_knee);
+        if (!pull::is_pulled(before, i)) total[i] -= squash(attractor[i] - q[i], gains.max_spring, gains.spring_knee);
+        if (reach.escapes) total[i] += squash(pull::escape_step * motor.escape * gains.unit, gains.max_spring, gains.spring_knee);
     }
 }
 

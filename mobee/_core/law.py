@@ -91,7 +91,7 @@ class Reach(ctypes.Structure):
         ("target", _VECTOR), ("target_normal", _VECTOR), ("radius", REAL), ("point", _VECTOR), ("normal", _VECTOR),
         ("marker_position", _VECTOR), ("marker_normal", _VECTOR), ("error", _TWIST), ("distance", REAL),
         ("smoothed_error", _TWIST), ("smoothed_distance", REAL), ("least_distance", REAL), ("time_without_progress", REAL),
-        ("started", INTEGER),
+        ("started", INTEGER), ("escapes", INTEGER),
     )  # fmt: skip
 
 

@@ -166,6 +166,25 @@ def test_the_published_reach_rests_where_pull_and_spring_are_equal() -> None:
     assert reach.reach_force(pull, State(plant.robot, long, q, 0.0 * q, q), 0.01, 0.0 * q)[1:] == pytest.approx(-spring, abs=1e-3)
 
 
+@given(seed=SEEDS)
+def test_reaches_that_pull_the_same_motors_cancel_each_spring_once(seed: int) -> None:
+    """Of the whole body and of an arm."""
+    q, attractor = poses(ICUB, seed, 2)
+    law, totals = Gains.default(), []
+    for goal in (q, attractor):
+        controller = Controller(Model(ICUB), law)
+        for part in (None, "left_arm"):
+            controller.reach_toward(part, "left_palm", ReachTarget((-0.3, -0.1, 0.1)))
+        total = np.zeros(len(q))
+        controller.reaches.add_forces(q, goal, 0.01, total)
+        totals.append(total)
+    error = attractor - q
+    most, stiffness = (law.of_robot(name, ICUB) for name in ("max_spring", "stiffness"))
+    spring = most * error / (most / stiffness + np.abs(error))
+    spring[np.setdiff1d(np.arange(len(q)), controller.reaches[None].motors["motor"])] = 0.0
+    assert totals[1] - totals[0] == pytest.approx(-spring, abs=1e-9)
+
+
 def one_part(robot: Robot) -> Model:
     return Model(replace(robot, parts={"arm": Part("arm", robot.motors, 0)}))
 
