@@ -201,11 +201,12 @@ MOBEE_CALL void mobee_plants_read(const Plant* const* plants, std::int64_t count
     }
 }
 
-// Set the attractors of several plants, (plants, motors).
+// Set the attractors of several plants, (plants, motors), as goals that do not move.
 MOBEE_CALL void mobee_plants_aim(Plant* const* plants, std::int64_t count, const double* attractors) {
     for (Plant* const* plant = plants; plant != plants + count; ++plant) {
         const std::int64_t n = (*plant)->law->motors.size;
         std::copy_n(attractors, n, (*plant)->attractor);
+        for (std::int64_t i = 0; i < n; ++i) (*plant)->law_state[i].goal_time = 0.0;
         attractors += n;
     }
 }

@@ -41,6 +41,13 @@ def checked_seed(seed: int) -> int:
     return int(seed)
 
 
+def checked_count(what: str, count: int) -> int:
+    """Return the given count as an int; raises InvalidValue, with the name `what`, unless it is a whole number of at least 0."""
+    if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 0:
+        raise InvalidValue(f"{what}={count!r}: give a whole number, 0 or more.")
+    return int(count)
+
+
 def checked_threads(threads: int) -> int:
     """Return the given number of threads unchanged; raises InvalidValue if it is not a whole number from 1 to MAX_THREADS (1024)."""
     if isinstance(threads, bool) or not isinstance(threads, int) or not 1 <= threads <= MAX_THREADS:

@@ -7,6 +7,7 @@ The states of the plants of a `PlantBatch`, which have one model, are rows of ar
 from __future__ import annotations
 
 import os
+import reprlib
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -18,7 +19,7 @@ import numpy as np
 
 from mobee._core import address
 from mobee._core import plant as core
-from mobee.arrays import Array, Ints, checked_threads, real_array
+from mobee.arrays import Array, Ints, checked_count, checked_threads, real_array
 from mobee.errors import ActionInterrupted, BatchInterrupted, InvalidValue
 from mobee.model.model import Model
 from mobee.plant import Outcome
@@ -62,10 +63,8 @@ def run_together(plants: Iterable[OfflinePlant], ticks: int, threads: int = 1) -
             `results` of the exception holds the trace of each plant, or the exception that ended it.
     """
     listed = _apart(plants)
-    if isinstance(ticks, bool) or not isinstance(ticks, int) or ticks < 0:
-        raise InvalidValue(f"ticks={ticks!r}: give a whole number, 0 or more.")
-    acting = [len(plant.acting) for plant in listed]
-    found = _finished([plant.running(ticks) for plant in listed], checked_threads(threads))
+    count, acting = checked_count("ticks", ticks), [len(plant.acting) for plant in listed]
+    found = _finished([plant.running(count) for plant in listed], checked_threads(threads))
     _follow_last([plant for plant, before in zip(listed, acting, strict=True) if len(plant.acting) < before])
     return found
 
@@ -90,17 +89,20 @@ def run_batch(work: Callable[[int], T], seeds: Iterable[int], processes: int | N
 class PlantBatch:
     """Several offline plants (simulated robots) of one model; the results of each are bit-equal to those of a separate `OfflinePlant`.
 
-    In all methods, `which` (k,) are indices of `plants`, each at most once.
+    In all methods, `which` (k,) are indices of `plants`, each at most once; other values raise InvalidValue.
 
     Args:
         model: the robot in its world.
         count: number of plants.
         settings: settings of all plants; None: the defaults of `PlantSettings`.
         threads: number of threads of the simulation.
+
+    Raises:
+        InvalidValue: `count` or `threads` is not valid.
     """
 
     def __init__(self, model: Model, count: int, settings: PlantSettings | None = None, threads: int = 1) -> None:
-        self.plants = [OfflinePlant(model, settings=settings) for _ in range(count)]
+        self.plants = [OfflinePlant(model, settings=settings) for _ in range(checked_count("count", count))]
         """The plants; each may be used separately between two calls."""
         self._model, self._threads, self._core = model, checked_threads(threads), core.calls()
         self._addresses: Ints = np.array([plant.address for plant in self.plants], dtype=np.int64)
@@ -122,19 +124,20 @@ class PlantBatch:
         No action begins, and the limits of the motors are not checked. Raises InvalidValue for another shape, and for numbers that are not
         finite.
         """
-        wanted = real_array("attractors", attractors)
-        shape = len(which), len(self._model.robot.motors)
+        places = self._addresses[self._checked(which)]
+        wanted, shape = real_array("attractors", attractors), (len(places), len(self._model.robot.motors))
         if wanted.shape != shape or not np.isfinite(wanted).all():
             raise InvalidValue(f"attractors of shape {wanted.shape}: must be {shape} rad, finite.")
-        self._core.aim_many(self._addresses[which].tobytes(), len(which), wanted.tobytes())
+        self._core.aim_many(places.tobytes(), len(places), wanted.tobytes())
 
     def run(self, which: Ints, ticks: int) -> Array:
         """Run exactly `ticks` ticks of each of the plants `which` (k,); return the depths of their deepest contacts.
 
         The end of an action does not stop the run. The result is (k, 2) m, of contacts of solids and of fields (volumes that cause
-        repulsive forces) during these ticks; 0 without contacts. Raises BatchInterrupted if a plant's state is not finite; the attribute
-        `results` of the exception then holds the rows of the other plants.
+        repulsive forces) during these ticks; 0 without contacts. Raises InvalidValue unless `ticks` is a whole number of at least 0, and
+        BatchInterrupted if a plant's state is not finite; the attribute `results` of the exception then holds the rows of the other plants.
         """
+        which, ticks = self._checked(which), checked_count("ticks", ticks)
         chosen = [self.plants[number] for number in which.tolist()]
         if not all([plant.prepare_batch(self._deepest[number]) for number, plant in zip(which.tolist(), chosen, strict=True)]):
             return _run_traced(chosen, ticks, self._threads)
@@ -149,6 +152,15 @@ class PlantBatch:
         if lost:
             raise BatchInterrupted([lost.get(row, depths) for row, depths in enumerate(deepest)]) from lost[min(lost)]
         return deepest
+
+    def _checked(self, which: Ints) -> Ints:
+        """Return the indices as an array; raises InvalidValue unless they are distinct indices of plants."""
+        given = np.asarray(which)
+        whole = given.ndim == 1 and (given.dtype.kind in "iu" or not given.size)
+        if not whole or not ((given >= 0) & (given < len(self.plants))).all() or len(set(given.tolist())) < len(given):
+            valid = f"it must be indices of plants, 0 to {len(self.plants) - 1}, each at most once"
+            raise InvalidValue(f"which is {' '.join(reprlib.repr(given).split())}; {valid}; use np.flatnonzero(mask) for a mask.")
+        return given.astype(np.intp, copy=False)
 
 
 def _run_traced(plants: Sequence[OfflinePlant], ticks: int, threads: int) -> Array:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mobee.arrays import Array, real_array
+from mobee.arrays import Array, checked_count, real_array
 from mobee.control import Controller, Gains
 from mobee.control.forces import Propagate, Term
 from mobee.control.law import Modality
@@ -351,7 +351,7 @@ class OfflinePlant:
     def run(self, ticks: int) -> Trace:
         """Run exactly `ticks` ticks; return positions, velocities and contact depths, one row per tick, as a `Trace`.
 
-        The end of an action does not stop the run.
+        The end of an action does not stop the run. Raises InvalidValue unless `ticks` is a whole number of at least 0.
         """
         return finished(self.running(ticks))
 
@@ -361,7 +361,7 @@ class OfflinePlant:
         Each step yields the memory address of the plant's structure, which the compiled core must run next; the return value is that of
         `run`. `ticks`: number of ticks.
         """
-        rows, left = [np.zeros((0, 3 * len(self.robot.motors) + 2))], ticks
+        rows, left = [np.zeros((0, 3 * len(self.robot.motors) + 2))], checked_count("ticks", ticks)
         while left > 0:
             rows.append((yield from self._ticks_of(min(left, CHUNK), traced=True)))
             left -= len(rows[-1])

@@ -107,3 +107,36 @@ def test_attractors_of_other_types_are_converted_and_of_other_shapes_refused() -
     for wrong in (np.ones((1, n)), np.ones((2, n - 1)), np.full((2, n), np.nan)):
         with pytest.raises(InvalidValue, match="attractors of shape"):
             batch.aim(np.array([0, 1]), wrong)
+
+
+def test_a_new_attractor_does_not_move() -> None:
+    batch = PlantBatch(Model(ICUB), 2, SETTINGS)
+    for plant in batch.plants:
+        plant.controller.follow("left_arm", plant.measure("left_arm"), np.ones(16))
+    batch.aim(np.array([1]), ICUB.home[None])
+    assert [bool(plant.controller.state["goal_time"].any()) for plant in batch.plants] == [True, False]
+
+
+@pytest.mark.parametrize("which", [np.array([True, False, True]), np.array([0, 0]), np.array([-1]), np.array([3]), np.array([0.0])])
+def test_plants_are_chosen_by_distinct_indices(which: Any) -> None:
+    """A mask of another length than the chosen plants, or a plant in two threads, would read and write memory of others."""
+    batch = PlantBatch(Model(ICUB), 3, SETTINGS)
+    with pytest.raises(InvalidValue, match="which .*indices of plants, 0 to 2, each at most once"):
+        batch.aim(which, np.tile(ICUB.home, (len(which), 1)))
+    with pytest.raises(InvalidValue, match="which .*indices of plants, 0 to 2, each at most once"):
+        batch.run(which, 1)
+    assert [plant.time for plant in batch.plants] == [0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize("ticks", [-1, 1.5, True, "a"])
+def test_a_number_of_ticks_is_whole(ticks: Any) -> None:
+    batch = PlantBatch(Model(ICUB), 1, SETTINGS)
+    for run in (lambda: batch.run(np.array([0]), ticks), lambda: batch.plants[0].run(ticks)):
+        with pytest.raises(InvalidValue, match="ticks=.*: give a whole number, 0 or more"):
+            run()
+
+
+@pytest.mark.parametrize("count", [-1, 1.5, True])
+def test_a_number_of_plants_is_whole(count: Any) -> None:
+    with pytest.raises(InvalidValue, match="count=.*: give a whole number, 0 or more"):
+        PlantBatch(Model(ICUB), count)
