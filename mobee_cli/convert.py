@@ -22,7 +22,7 @@ from mobee.robot.urdf.write import write_urdf
 from mobee.robot.xml.node import Remark
 from mobee.robot.xml.write import write_upgraded, write_xml
 from mobee_cli.errors import UserError
-from mobee_cli.robot_options import add_urdf_options, urdf_options
+from mobee_cli.robot_options import add_urdf_options, require_none, urdf_options
 from services.common.exit_codes import BAD_INPUT, FAILED
 
 WRITERS = {".xml": write_xml, ".urdf": write_urdf}
@@ -61,6 +61,8 @@ def _convert(arguments: argparse.Namespace, target: Path) -> list[str]:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         world = world_file(arguments.source)
+        if world is not None:
+            require_none(arguments, f"{world} is a world, and this option is for robots in URDF and MJCF: leave it out", ())
         content = load_robot(arguments.source, **urdf_options(arguments)) if world is None else load_world(world)
     if isinstance(content, World):
         if world is None or target.suffix.lower() != ".xml":

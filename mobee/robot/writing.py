@@ -42,12 +42,14 @@ def drives_of(robot: Robot) -> tuple[Drive, ...]:
 def write_whole(path: Path, content: bytes) -> Path:
     """Write a file completely or not at all, and return its path.
 
-    The content is written into a temporary file in the same folder, which then replaces the file. Raises OSError.
+    The content is written into a temporary file in the same folder, which then replaces the file. Raises OSError with the name of `path`.
     """
     beside = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         beside.write_bytes(content)
         os.replace(beside, path)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from error
     finally:
         beside.unlink(missing_ok=True)
     return path

@@ -10,7 +10,7 @@ from mobee.errors import OlderVersion
 from mobee.model.world_file import load_world
 from mobee.robot.load import load_robot
 from mobee_cli.__main__ import main
-from services.common.exit_codes import BAD_INPUT
+from services.common.exit_codes import BAD_INPUT, FAILED
 from tests.mobee.robot.same_robot import assert_same_robot
 from tests.mobee.robot.urdf_files import foreign
 
@@ -43,7 +43,9 @@ def test_an_old_robot_is_converted_with_remarks_on_its_interpretation(tmp_path: 
     (tmp_path / "parts").mkdir()
     (tmp_path / "new").mkdir()
     old, new = tmp_path / "parts" / "old.xml", tmp_path / "new" / "new.xml"
-    motor = '<motor name="m" minPos="0" maxPos="9"><joint z="1"><link x="1"><marker name="tip" nx="1"/></link></joint></motor>'
+    (tmp_path / "parts" / "hand.stl").touch()
+    link = '<link x="1"><visual file="hand.stl"/><marker name="tip" nx="1"/></link>'
+    motor = f'<motor name="m" minPos="0" maxPos="9"><joint z="1">{link}</joint></motor>'
     old.write_text(f'<ZeroPositionKinematicTree robotName="old"><bodypart name="arm">{motor}</bodypart></ZeroPositionKinematicTree>')
     pair = tmp_path / "parts" / "pair.xml"
     pair.write_text('<ZeroPositionKinematicTree robotName="pair"><robot name="a" file="old.xml"/></ZeroPositionKinematicTree>')
@@ -51,6 +53,7 @@ def test_an_old_robot_is_converted_with_remarks_on_its_interpretation(tmp_path: 
     said = capsys.readouterr().out
     assert f"{new}: old, 1 motors, 1 joints, 0 shapes, 1 markers" in said
     assert "old.xml:1: read as MoBeE 0.1 read it: what stands inside a <link> stands at its end (here)" in said
+    assert '<visual file="../parts/hand.stl"' in new.read_text()
     assert 'version="2.0"' in new.read_text() and 'px="1' in new.read_text()
     assert main(["convert", str(pair), str(tmp_path / "new" / "pair.xml")]) == 0
     with warnings.catch_warnings():
@@ -75,6 +78,8 @@ def test_a_world_goes_into_todays_form_and_not_into_a_urdf(tmp_path: Path, capsy
         (["icub", "x.sdf"], BAD_INPUT, "x.sdf: OUT must end in .xml or .urdf"),
         (["icub", "nowhere/x.urdf"], BAD_INPUT, "there is no folder"),
         (["icub", "x.urdf", "--field", "0.1"], BAD_INPUT, "field= is for URDF and MJCF files"),
+        (["table", "x.xml", "--field", "0.1"], BAD_INPUT, "--field 0.1: "),
+        (["icub", "folder.xml", "--force"], FAILED, "folder.xml cannot be written (Is a directory)"),
         (["mine.urdf", "x.xml"], BAD_INPUT, "mine.urdf: no such file"),
     ],
 )
@@ -82,6 +87,7 @@ def test_mistakes_are_answered_in_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], arguments: list[str], code: int, message: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    (tmp_path / "folder.xml").mkdir()
     assert main(["convert", *arguments]) == code
     said = capsys.readouterr().err
     assert message in said

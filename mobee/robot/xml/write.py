@@ -18,7 +18,7 @@ from mobee.robot.motor_units import in_metres
 from mobee.robot.robot import Body, Clause, Joint, MeshSource, Motor, Robot, Shape
 from mobee.robot.urdf.mesh import mesh_name
 from mobee.robot.writing import Drive, degrees, drives_of, number, numbers
-from mobee.robot.xml.node import DEEPEST, VERSION, Remark, read_xml, tree_of, write_tree
+from mobee.robot.xml.node import DEEPEST, VERSION, Remark, descendants, read_xml, tree_of, write_tree
 from mobee.robot.xml.pairs import ignore_elements
 from mobee.robot.xml.versions import WORLD_TAGS, upgrade_robot, upgrade_world
 from mobee.robot.xml.volume import PLACE, height_and_angle
@@ -69,8 +69,10 @@ def write_upgraded(source: Path, target: Path) -> list[Remark] | None:
         return None
     else:
         remarks = upgrade_robot(root)
-    for node in root:
-        if node.tag == "robot" and (source.parent / node.text("file")).is_file():  # no shipped name
+    for node in descendants(root):
+        if node.tag == "visual" and node.optional("file"):
+            node.attributes["file"] = mesh_name(MeshSource(node.text("file"), source), target)
+        elif node.tag == "robot" and (source.parent / node.text("file")).is_file():  # no shipped name
             node.attributes["file"] = Path(os.path.relpath(source.parent / node.text("file"), target.parent)).as_posix()
     write_tree(tree_of(root), target, f"Written by mobee convert from {source.name}.")
     return remarks
