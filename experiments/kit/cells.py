@@ -8,6 +8,7 @@ import os
 import re
 import tempfile
 import zipfile
+import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
@@ -70,6 +71,7 @@ FOLDER = "cells"
 CELL_FILES = (f"{FOLDER}/*.npz",)
 """Glob patterns that match the files of the finished cells in the folder of a run."""
 _RECORD, _ARRAY = "record", "array."  # names in the archive: of the JSON text, and the prefix of the arrays
+_DAMAGE = (OSError, KeyError, TypeError, ValueError, EOFError, RuntimeError, zipfile.BadZipFile, zlib.error)  # of reading a damaged file
 
 
 def write_cell(folder: Path, cell: Cell, values: dict[str, Any], seconds: float) -> None:
@@ -121,23 +123,25 @@ def reduced_cells(folder: Path, summary: Callable[[dict[str, Any]], dict[str, An
 
 def read_cell(path: Path) -> CellResult:
     """Read a finished cell from its file, without its values, which are read at the first access to `CellResult.values`."""
-    record = _read(path, arrays=False)[0]
-    return CellResult(Cell(**record["cell"]), record["seconds"], path)
+    return _read(path, arrays=False)[0]
 
 
 def read_values(path: Path) -> dict[str, Any]:
     """Read the values of a finished cell from its file: JSON values and arrays, by name."""
-    record, arrays = _read(path, arrays=True)
-    return {**record["values"], **arrays}
+    return _read(path, arrays=True)[1]
 
 
-def _read(path: Path, arrays: bool) -> tuple[dict[str, Any], dict[str, Array]]:
+def _read(path: Path, arrays: bool) -> tuple[CellResult, dict[str, Any]]:
     try:
         with np.load(path, allow_pickle=False) as archive:
             record = json.loads(archive[_RECORD].tobytes())
+            cell = Cell(**record["cell"])
+            if cell.name != path.stem:
+                raise InvalidValue(f"it holds the cell {cell.name}")
             names = [name for name in archive.files if arrays and name.startswith(_ARRAY)]
-            return record, {name.removeprefix(_ARRAY): archive[name] for name in names}
-    except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
+            found = {name.removeprefix(_ARRAY): archive[name] for name in names}
+            return CellResult(cell, record["seconds"], path), {**record["values"], **found}
+    except _DAMAGE as error:
         raise InvalidValue(f"{path} is not a finished cell ({error}): delete it, and the run will repeat the cell.") from None
 
 

@@ -2,11 +2,13 @@
 from __future__ import annotations
 
 import argparse
+import io
 import os
 import signal
 import subprocess
 import sys
 import time
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -144,11 +146,40 @@ def test_a_half_written_file_is_not_a_cell(tmp_path):
     assert set(load_cells(tmp_path)) == {"toy-s0"}
 
 
-def test_a_damaged_file_is_named(tmp_path):
+def damaged_archive(content: bytes) -> bytes:
+    """Overwrite the data of all arrays, but neither the headers nor the table of contents."""
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        entries = archive.infolist()
+    damaged = bytearray(content)
+    for entry in entries:
+        begin = entry.header_offset + 30 + len(entry.filename) + 20  # np.savez writes 20 bytes of extra data
+        damaged[begin : begin + entry.compress_size] = b"\xff" * entry.compress_size
+    return bytes(damaged)
+
+
+def without_a_seed(content: bytes) -> bytes:
+    file = io.BytesIO()
+    np.savez(file, record=np.frombuffer(b'{"cell": {"name": "toy-s0"}, "seconds": 1.0, "values": {}}', dtype=np.uint8))
+    return file.getvalue()
+
+
+DAMAGES = [lambda content: b"", lambda content: content[:100], damaged_archive, without_a_seed]
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_damaged_file_is_named(tmp_path, damage):
     run_cells(work, cells(1), tmp_path, inline(tmp_path))
     path = tmp_path / "cells" / "toy-s0.npz"
-    path.write_bytes(path.read_bytes()[:100])
+    path.write_bytes(damage(path.read_bytes()))
     with pytest.raises(InvalidValue, match=r"toy-s0\.npz is not a finished cell"):
+        load_cells(tmp_path)
+
+
+def test_a_copied_file_is_not_a_second_cell(tmp_path):
+    run_cells(work, cells(1), tmp_path, inline(tmp_path))
+    path = tmp_path / "cells" / "toy-s0.npz"
+    path.with_name("toy-s0 (copy).npz").write_bytes(path.read_bytes())
+    with pytest.raises(InvalidValue, match=r"\(copy\)\.npz is not a finished cell \(it holds the cell toy-s0\)"):
         load_cells(tmp_path)
 
 
