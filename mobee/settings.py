@@ -7,6 +7,7 @@ import importlib
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
+from operator import attrgetter
 from typing import Any, Literal, Self, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -59,7 +60,10 @@ class Settings:
 
     def __post_init__(self) -> None:
         for name, hint in hints_of(type(self)).items():
-            _check(name, getattr(self, name), hint)
+            value = getattr(self, name)
+            if isinstance(value, np.generic):  # no JSON value: it could not be recorded
+                object.__setattr__(self, name, value := value.item())
+            _check(name, value, hint)
 
     @classmethod
     def made(cls, settings: Self | None, changes: Mapping[str, Any]) -> Self:
@@ -138,19 +142,23 @@ def require_name(kind: str, given: str, table: Mapping[str, object]) -> None:
 def imported(kind: str, path: str) -> Any:
     """Import and return the object that `path` names as `module:name`; raises InvalidValue if it cannot be imported.
 
-    `kind`: what the object is, such as "detector", for the error message.
+    `kind`: what the object is, such as "detector", for the error message. The name may be one within a class, as `module:Class.name`.
     """
     module, _, name = path.partition(":")
     try:
-        return getattr(importlib.import_module(module), name)
+        return attrgetter(name)(importlib.import_module(module))
     except (ImportError, AttributeError, ValueError) as error:
         raise InvalidValue(f"{kind} {path!r}: {error}. It must be module:name, installed or in the working directory.") from None
 
 
 def _check(name: str, value: object, hint: Any) -> None:
-    """Raise InvalidValue if a value is outside its `Range`, UnknownName if it is none of its `Literal` values."""
+    """Raise InvalidValue for a value outside its `Range`, or not of the type int or bool; UnknownName if it is no `Literal` value."""
     metadata = getattr(hint, "__metadata__", ())
     kind = get_args(hint)[0] if metadata else hint
+    if kind is bool and not isinstance(value, bool):
+        raise InvalidValue(f"{name}={value!r}: valid is True or False.")
+    if kind is int and (isinstance(value, bool) or not isinstance(value, int)):
+        raise InvalidValue(f"{name}={value!r}: valid is a whole number{', '.join(['', *map(str, metadata)])}.")
     if get_origin(kind) is Literal and value not in get_args(kind):
         raise UnknownName(name, value, get_args(kind))
     for valid in metadata:

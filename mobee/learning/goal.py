@@ -32,7 +32,7 @@ class External:
     """
 
     def __init__(self, space: Space, goal: Goal, weight: float | None = None) -> None:
-        if weight is not None and not np.isfinite(weight):
+        if weight is not None and not (isinstance(weight, int | float) and np.isfinite(weight)):
             raise InvalidValue(f"goal_weight={weight!r}: give a finite factor, or None to replace the intrinsic reward.")
         self.weight = weight
         exists = space.goals != NO_ACTION

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 
-from mobee.arrays import Array
+from mobee.arrays import Array, real_array
 from mobee.errors import InvalidValue
 from mobee.learning.explorers import EXPLORERS, Draws, Explorer, choose
 from mobee.learning.goal import Goal, pursued, require_pursuing
@@ -45,7 +45,7 @@ class CuriousSettings(Settings):
     """
 
     explorer: str | Explorer = "curious"
-    seed: int = 0
+    seed: Annotated[int, Range(ge=0)] = 0
     discount: Annotated[float, Range(ge=0, lt=1)] = 0.9
     initial: Literal["50-50", "60-40"] = "50-50"
     divergence: str | Divergence = "kail"
@@ -211,7 +211,7 @@ class CuriousLearner:
         draws = self._draws.at(self.seed, self.transitions)
         scores = self._scores(state, draws)
         if self.explorer not in EXPLORERS:
-            self._require_scores(scores, state)
+            scores = self._checked_scores(scores, state)
         return choose(scores, draws)
 
     def _scores(self, state: int, draws: np.random.Generator) -> Array:
@@ -222,13 +222,17 @@ class CuriousLearner:
         finally:
             self._plans.decides = False
 
-    def _require_scores(self, scores: Array, state: int) -> None:
-        """Raise InvalidValue unless an explorer of the user gives a number for each action of the state."""
+    def _checked_scores(self, given: Any, state: int) -> Array:
+        """Return the scores that an explorer of the user gave; raises InvalidValue unless each action of the state has a number."""
         actions = len(self.space.actions(state))
-        if np.shape(scores) != (actions,) or np.isnan(scores).any():
-            raise InvalidValue(
-                f"explorer {self.explorer!r} returned {scores!r} in state {state}: give a score for each action, shape ({actions},)."
-            )
+        said = f"explorer {self.explorer!r} returned {given!r} in state {state}: give a score for each action, shape ({actions},)."
+        try:
+            scores = real_array("scores", given)
+        except InvalidValue:
+            raise InvalidValue(said) from None
+        if scores.shape != (actions,) or np.isnan(scores).any():
+            raise InvalidValue(said)
+        return scores
 
     def _learn(self, transition: Transition) -> None:
         self.model.observe(transition.s, transition.a, transition.s_next)

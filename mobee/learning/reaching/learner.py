@@ -57,7 +57,7 @@ class ReachSettings(Settings):
     scale: Annotated[float, Range(gt=0)] = SCALE
     penalty: Annotated[float, Range(lt=0)] = -10.0
     limit: Annotated[int, Range(ge=1)] = 10
-    seed: int = 0
+    seed: Annotated[int, Range(ge=0)] = 0
 
 
 class ReachLearner:

@@ -76,6 +76,7 @@ def test_a_goal_is_among_the_settings_on_record(tmp_path):
         ({"goal": np.zeros((3, 3))}, r"shape \(3, 3\).*shape \(81, 8\)"),
         ({"goal": np.full((81, 8), np.nan)}, "not finite"),
         ({"goal": [3], "goal_weight": np.inf}, "goal_weight=inf"),
+        ({"goal": [3], "goal_weight": "much"}, "goal_weight=.much."),
         ({"goal_weight": 1.0}, "without a goal"),
         ({"goal": [3], "explorer": "random"}, "'random' ignores a goal: take 'curious'"),
     ],

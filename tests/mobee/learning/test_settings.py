@@ -18,8 +18,10 @@ from mobee.learning.learner import CuriousSettings
 from mobee.learning.reaching.learner import ReachSettings
 from mobee.learning.reaching.predictors.local_averages import Nearest
 from mobee.learning.reaching.reach_agent import ReachAgent
+from mobee.learning.reaching.store import ReachStore
 from mobee.learning.transitions import TransitionModel, kl_divergence
 from mobee.simulation.plant import OfflinePlant, PlantSettings
+from mobee.store import TransitionStore
 from services.agents.config import TASK, Config
 from services.common.config import ConfigError, read_toml
 from tests.mobee.learning.reaching.toy import HANDS, SPACE, plant
@@ -69,6 +71,14 @@ def test_an_unknown_setting_is_refused_with_the_nearest_name(make):
         (CuriousSettings, {"tolerance": float("inf")}, "tolerance=inf: valid is"),
         (CuriousSettings, {"tolerance": "fine"}, "tolerance='fine': valid is"),
         (CuriousSettings, {"beliefs": "debaised"}, "Did you mean 'debiased'"),
+        (CuriousSettings, {"seed": None}, "seed=None: valid is a whole number, at least 0"),
+        (CuriousSettings, {"seed": 1.5}, "seed=1.5: valid is a whole number, at least 0"),
+        (CuriousSettings, {"seed": True}, "seed=True: valid is a whole number, at least 0"),
+        (CuriousSettings, {"seed": -1}, "seed=-1: valid is a number at least 0"),
+        (CuriousSettings, {"relative": "no"}, "relative='no': valid is True or False"),
+        (PlantSettings, {"hashed": 1}, "hashed=1: valid is True or False"),
+        (ReachSettings, {"seed": float("nan")}, "seed=nan: valid is a whole number, at least 0"),
+        (ReachSettings, {"limit": 2.5}, "limit=2.5: valid is a whole number, at least 1"),
         (ReachSettings, {"limit": 0}, "limit=0: valid is a number at least 1"),
         (ReachSettings, {"penalty": 0.0}, "penalty=0.0: valid is a number below 0"),
         (ReachSettings, {"failures": "globally"}, "Valid: alike, local, spread"),
@@ -77,6 +87,16 @@ def test_an_unknown_setting_is_refused_with_the_nearest_name(make):
 def test_values_are_checked_when_settings_are_made(make, options, message):
     with pytest.raises((InvalidValue, UnknownName), match=message):
         make(**options)
+
+
+def test_numbers_of_numpy_are_recorded_as_plain_ones(tmp_path):
+    options = {"seed": np.int64(3), "discount": np.float32(0.5), "relative": np.bool_(False), "goal": [2], "goal_weight": np.float32(0.25)}
+    with TransitionStore(tmp_path / "run.sqlite", "torso") as store:
+        curious(store=store, **options).run(3)
+        assert curious(store=store, seed=3, discount=0.5, relative=False, goal=[2], goal_weight=0.25).transitions == 3
+    with ReachStore(tmp_path / "run.sqlite", SPACE.part) as store:
+        reacher(store=store, scale=np.float32(0.25), limit=np.int16(4))
+        assert store.settings()["scale"] == 0.25
 
 
 @pytest.mark.parametrize(("agent", "settings"), [*BOTH.args[1], (OfflinePlant, PlantSettings)])
