@@ -10,11 +10,11 @@ from typing import Any, Protocol, cast
 
 from mobee.arrays import Array
 from mobee.errors import ActionInterrupted, InvalidValue, MobeeError
-from mobee.learning.explorers import Explorer
+from mobee.learning.explorers import EXPLORERS, Explorer
 from mobee.learning.learner import CuriousLearner, CuriousSettings
 from mobee.learning.space import Space
 from mobee.plant import Described, Outcome, Plant, present_outcome
-from mobee.settings import accepts
+from mobee.settings import accepts, imported, named
 from mobee.store import Transition, TransitionStore
 
 
@@ -104,8 +104,13 @@ class CuriousAgent(CuriousLearner):
 
         Raises:
             UnknownName: no such explorer.
-            InvalidValue: the agent has a goal, which this explorer ignores.
+            InvalidValue: the agent has a goal, which this explorer ignores; or it has a store, and a restarted agent could not import the
+                function by its name.
         """
+        if self.store is not None and not isinstance(explorer, str):
+            name = named("explorer", explorer, EXPLORERS)[0]
+            if imported("explorer", name) is not explorer:
+                raise InvalidValue(f"explorer {name!r} is another one than the given: with a store, give a function of a module.")
         self._explore_by(explorer)
         if self.store is not None:
             self.store.change_explorer(self.transitions + (self._pending is not None), self.explorer)

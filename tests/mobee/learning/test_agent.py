@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from functools import partial
 
 import numpy as np
 import pytest
@@ -129,13 +130,46 @@ def test_an_explorer_of_the_user_is_called_and_recorded_by_its_module():
         ("math:pi", "cannot be called"),
         (lambda agent, state, rng: np.zeros(3), r"give a score for each action, shape \(16,\)"),
         (lambda agent, state, rng: np.full(16, np.nan), "give a score for each action"),
+        (lambda agent, state, rng: ["much"] * 16, "returned .'much'.*give a score for each action"),
+        (lambda agent, state, rng: np.full(16, 1j), "give a score for each action"),
     ],
-    ids=["no name", "no module", "no function", "no function at all", "wrong shape", "no numbers"],
+    ids=["no name", "no module", "no function", "no function at all", "wrong shape", "not finite", "no numbers", "complex"],
 )
 def test_an_explorer_that_does_not_serve_is_refused(explorer, said):
     space = arm()
     with pytest.raises(MobeeError, match=said):
         CuriousAgent(space, InstantPlant(space.robot), explorer=explorer).run(1)
+
+
+class Listed:
+    @staticmethod
+    def last_action(agent, state, rng):
+        return [float(action) for action in range(len(agent.model.space.actions(state)))]
+
+
+def test_scores_may_be_a_list_and_the_explorer_a_function_of_a_class():
+    space = arm()
+    agents = [CuriousAgent(space, InstantPlant(space.robot), explorer=one) for one in (last_action, Listed.last_action)]
+    agents.append(CuriousAgent(space, InstantPlant(space.robot), explorer=agents[1].settings["explorer"]))
+    for agent in agents:
+        agent.run(5)
+    assert agents[0].last == agents[1].last == agents[2].last
+
+
+@pytest.mark.parametrize(
+    ("explorer", "said"),
+    [(lambda agent, state, rng: np.zeros(16), "<lambda>"), (partial(last_action), "functools:partial.*another one than the given")],
+)
+def test_a_change_to_an_explorer_that_a_restarted_agent_could_not_find_is_refused(tmp_path, explorer, said):
+    space = arm()
+    with TransitionStore(tmp_path / "run.sqlite", space.part) as store:
+        agent = CuriousAgent(space, InstantPlant(space.robot), store=store)
+        with pytest.raises(InvalidValue, match=said):
+            agent.explore_by(explorer)
+        agent.explore_by(last_action)
+        agent.run(2)
+        again = CuriousAgent(space, InstantPlant(space.robot), store=store)
+        assert (again.explorer, again.transitions) == (agent.explorer, 2)
 
 
 RESUMED = [{"explorer": name} for name in EXPLORERS] + [
