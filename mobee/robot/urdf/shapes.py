@@ -83,7 +83,8 @@ class ShapeReader:
         base = link == 0
         if note is not None:
             note.check_attributes({"field", "part", "base", "capsule"})
-            part = note.choice("part", note.optional("part") or part, self.parts, "part")
+            part = note.attributes.get("part", part)
+            part = part and note.choice("part", part, self.parts, "part")
             base = note.flag("base", default=base)
         place = frame @ read_origin(node)
         shape = Shape(name, link, "sphere", (), place.position, place.rotation, "solid", part)

@@ -138,13 +138,13 @@ def _joint(robot: Robot, drive: Drive, into: ET.Element, index: int) -> ET.Eleme
 
 
 def _write_body(robot: Robot, element: ET.Element, link: int, origin: Array) -> None:
-    """Write mass, shapes and markers of a link; the shapes of each part in a <bodypart> of its name."""
+    """Write mass, shapes and markers of a link; the shapes of each part in a <bodypart> of its name, those of no part outside of it."""
     element.extend(_mass(body, origin) for body in robot.bodies if body.link == link)
-    parts: dict[str, ET.Element] = {}
+    parts = {"": element}
     for index, shape in enumerate(robot.shapes):
         if shape.link != link:
             continue
-        if shape.part not in robot.parts:
+        if shape.part and shape.part not in robot.parts:
             raise InvalidValue(f"shape {shape.name!r} is of part {shape.part!r}, which the robot does not have.")
         if shape.part not in parts:
             parts[shape.part] = ET.SubElement(element, "bodypart", name=shape.part)

@@ -73,6 +73,20 @@ def test_capsules_that_meet_and_cylinders_with_spheres_remain_what_they_are(tmp_
     assert_same_robot(robot, read_back(robot, tmp_path))
 
 
+def test_shapes_outside_of_every_part_remain_there(tmp_path: Path) -> None:
+    path = robot_file(
+        tmp_path,
+        '<link z="0.2" radius="0.05" field="0.08"><bodypart name="arm">',
+        '<motor name="pan" minPos="-90" maxPos="90"><joint z="1"><link x="-0.2">',
+        '<motor name="bend" minPos="0" maxPos="90"><joint y="1"><link x="-0.2" radius="0.02" field="0.06"/></joint></motor>',
+        "</link></joint></motor></bodypart></link>",
+    )
+    robot = load_robot(path)
+    assert robot.shapes[0].part == ""
+    assert len(robot.field_pairs) == 1
+    assert_same_robot(robot, read_back(robot, tmp_path))
+
+
 def test_coupled_motors_are_mimic_joints_and_markers_fixed_links(tmp_path: Path) -> None:
     root = defusedxml.ElementTree.parse(write_urdf(load_robot("katana"), tmp_path / "k.urdf")).getroot()
     mimics = {joint.get("name"): joint.find("mimic").attrib for joint in root.iter("joint") if joint.find("mimic") is not None}

@@ -204,6 +204,20 @@ def test_constraints_are_read_back_with_motors_in_metres_and_names_that_are_no_w
     assert np.abs(clause.b - again.b).max() < 1e-12
 
 
+def test_shapes_outside_of_every_part_remain_there(tmp_path: Path) -> None:
+    path = robot_file(
+        tmp_path,
+        '<link z="0.2" radius="0.05" field="0.08"><bodypart name="arm">',
+        '<motor name="pan" minPos="-90" maxPos="90"><joint z="1"><link x="-0.2">',
+        '<motor name="bend" minPos="0" maxPos="90"><joint y="1"><link x="-0.2" radius="0.02" field="0.06"/></joint></motor>',
+        "</link></joint></motor></bodypart></link>",
+    )
+    robot = load_robot(path)
+    assert robot.shapes[0].part == ""
+    assert len(robot.field_pairs) == 1
+    assert_same_robot(robot, read_back(robot, tmp_path))
+
+
 def test_an_unknown_unit_of_a_motor_is_refused(tmp_path: Path) -> None:
     text = write_xml(load_robot("katana"), tmp_path / "katana.xml").read_text()
     (tmp_path / "katana.xml").write_text(text.replace("<motor ", '<motor unit="rad" ', 1))
