@@ -157,15 +157,16 @@ class ReachesUnderWay:
         pulled = [part for part, reach in self._under_way.items() if reach.end is None]
         if target is None and pulled:
             raise InvalidValue(f"{', '.join(pulled)} is reaching for the target: it can be moved but not removed")
-        world, self._target = self._model.world, target
-        there = world.objects.get(TARGET)
-        if target and there and (there.kind, there.size, there.role) == ("sphere", (target.radius,), "target"):
+        world = self._model.world
+        there, shape = world.objects.get(TARGET), None if target is None else sphere(target.radius)
+        if target and there and shape and (there.kind, there.size, there.role) == (shape.kind, shape.size, "target"):
             world.move(TARGET, position=target.position)
         else:
             if there is not None:
                 world.remove(TARGET)
-            if target is not None:
-                world.add(TARGET, sphere(target.radius), position=target.position, role="target")
+            if target and shape:
+                world.add(TARGET, shape, position=target.position, role="target")
+        self._target = target
         if target is not None:
             for part in pulled:
                 self._controller.reach_toward(part, self._under_way[part].name, target)
@@ -173,13 +174,13 @@ class ReachesUnderWay:
     def begin(self, part: str, marker: str, stay: bool) -> None:
         """Start the force that pulls the marker of a part to the target; raise InvalidValue if no target is presented.
 
-        `stay`: whether the part stays in the pose in which the force ends.
+        If the reach is refused, nothing changes. `stay`: whether the part stays in the pose in which the force ends.
         """
         if self._target is None:
             raise InvalidValue(f"{part} cannot reach: no target is presented; call present(ReachTarget(position)) first")
-        target = self._target
-        self.drop(part)
-        self._controller.reach_toward(part, marker, target)
+        self._controller.reaches.begin(part, marker)  # also ends an earlier reach of the part; if it refuses, that continues
+        self._controller.reach_toward(part, marker, self._target)
+        self._settled.pop(part, None)
         self._under_way[part] = Reach(marker, stay)
 
     def ended(self, part: str, end: Outcome, pose: Pose) -> bool:

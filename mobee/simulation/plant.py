@@ -250,8 +250,9 @@ class OfflinePlant:
         InvalidValue while another part is acting (then use `begin` and `advance`).
         """
         self._require_alone(part, "act")
+        exempt = None if reaching is None else self.robot.marker(reaching).name
         self.begin(part, target)
-        self._reaches.exempt = None if reaching is None else self.robot.marker(reaching).name
+        self._reaches.exempt = exempt
         try:
             return self.advance()[0][1]
         finally:

@@ -9,7 +9,7 @@ import pytest
 
 from mobee.arrays import Array
 from mobee.control import Controller, Gains, Settle
-from mobee.errors import ActionInterrupted, InvalidValue
+from mobee.errors import ActionInterrupted, InvalidValue, UnknownName
 from mobee.model import sphere
 from mobee.model.model import Model
 from mobee.model.world_file import load_world
@@ -80,6 +80,24 @@ def test_a_reach_without_a_target_is_refused() -> None:
         plant.reach("arm", "tip")
     with pytest.raises(InvalidValue, match="has not ended a reach"):
         plant.reached("arm")
+
+
+def test_a_refused_call_changes_nothing() -> None:
+    plant = bent()
+    with pytest.raises(UnknownName, match="marker"):
+        plant.act("arm", np.zeros(2), reaching="nothing")
+    assert plant.acting == () and plant.controller.attractor[1:] == pytest.approx([0.5, 0.5])
+    plant.present(NEAR)
+    plant.begin_reach("arm", "tip")
+    with pytest.raises(UnknownName, match="marker"):
+        plant.begin_reach("arm", "nothing")
+    with pytest.raises(InvalidValue, match="radius"):
+        plant.present(replace(NEAR, radius=1e-10))
+    assert plant.reaching == ("tip",) and plant.model.world.objects[TARGET].size == (NEAR.radius,)
+    plant.advance()
+    undisturbed = bent()
+    undisturbed.present(NEAR)
+    assert np.array_equal(plant.reached("arm").q, undisturbed.reach("arm", "tip").q)
 
 
 def test_a_presented_target_is_moved_and_grows() -> None:
