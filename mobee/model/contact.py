@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from mobee._core import NUMBERS, REALS, ROW_BYTES
 from mobee.arrays import Array
+from mobee.errors import InvalidValue
 from mobee.robot.robot import Robot
 
 if TYPE_CHECKING:
@@ -163,7 +164,7 @@ def touched(pose: Pose) -> dict[str, tuple[str, ...]]:
     """Return, for each part by name, the sorted names of the free world objects that touch the part in a pose.
 
     An object touches a part if it overlaps a volume of a link that the part's motors move: a solid, a field (a larger volume that causes a
-    repulsive force), or an object that is attached to the link. `pose`: one pose, not a batch.
+    repulsive force), or an object that is attached to the link. `pose`: one pose; raises InvalidValue for a batch.
     """
     return {part: touched_by(pose, part) for part in pose.robot.parts}
 
@@ -172,8 +173,11 @@ def touched_by(pose: Pose, part: str) -> tuple[str, ...]:
     """Return the sorted names of the free world objects that touch a part in a pose.
 
     An object touches a part if it overlaps a volume of a link that the part's motors move: a solid, a field (a larger volume that causes a
-    repulsive force), or an object that is attached to the link. `pose`: one pose, not a batch. `part`: name of the part.
+    repulsive force), or an object that is attached to the link. `pose`: one pose; raises InvalidValue for a batch. `part`: name of the
+    part.
     """
+    if pose.q.ndim != 1:
+        raise InvalidValue(f"a batch of poses, of shape {pose.q.shape}: objects touch a part in one pose; evaluate one q.")
     return touched_in(pose.table, links_moved(pose.robot)[part])
 
 

@@ -196,7 +196,7 @@ class Pose:
         """The world's objects at the time of this evaluation, by name; for one pose, not a batch.
 
         Attached objects are given as free objects at their place in this pose. Raises UnknownName if an object is attached to a link that
-        the robot does not have.
+        the robot does not have, and InvalidValue for a batch if an object is attached.
         """
         return {
             name: thing if thing.link is None else placed(thing, link_pose(self, thing.link))

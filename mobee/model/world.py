@@ -178,7 +178,7 @@ class World:
 def link_pose(seen: LinkPoses | None, link: str) -> Array:
     """Return the transform (4, 4) of the named link, from its place at zero pose to its place in a pose of the robot, root frame.
 
-    `seen`: the pose; None: no pose is known, which raises InvalidValue. Raises UnknownName for an unknown link.
+    `seen`: the pose; None: no pose is known, which raises InvalidValue, as a batch of poses does. Raises UnknownName for an unknown link.
     """
     if seen is None:
         raise InvalidValue(
@@ -187,5 +187,10 @@ def link_pose(seen: LinkPoses | None, link: str) -> Array:
     links = seen.robot.links
     if link not in links:
         raise UnknownName("link", link, links)
+    if seen.transforms.ndim != 3:
+        raise InvalidValue(
+            f"link {link!r} in a batch of poses, of shape {seen.transforms.shape[:-3]}: it has one place in one pose only; "
+            "give world.follow, or read objects of, model.evaluate(q) with one q."
+        )
     pose: Array = seen.transforms[links.index(link)]
     return pose

@@ -239,7 +239,8 @@ def valid_color(name: str, given: Sequence[float] | None) -> Color | None:
     """
     if given is None:
         return None
-    channels = tuple(float(c) for c in given)
+    found = _numbers(given)
+    channels = () if found is None or found.ndim != 1 else tuple(found.tolist())
     if len(channels) == 3:
         channels = (*channels, 1.0)
     if len(channels) != 4 or not all(0.0 <= c <= 1.0 for c in channels):

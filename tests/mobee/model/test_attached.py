@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import mobee
+from mobee.model.contact import touched, touched_by
 from tests.mobee.planar import LENGTH, planar_arm
 
 HAND = (3 * LENGTH, 0.0, 0.0)  # the arm is stretched
@@ -25,6 +26,17 @@ def model() -> mobee.Model:
 
 def names(pose: mobee.Pose) -> set[tuple[str, str, str]]:
     return {(c.kind, c.first, c.second) for c in pose.contacts if "tool" in (c.first, c.second)}
+
+
+@pytest.mark.parametrize("poses", [(1, 3), (4, 3), (2, 2, 3)])
+def test_a_batch_of_poses_has_no_place_for_it(model: mobee.Model, poses: tuple[int, ...]) -> None:
+    batch = model.evaluate(np.zeros(poses))
+    for read in (lambda: batch.objects, lambda: touched(batch), lambda: touched_by(batch, "arm")):
+        with pytest.raises(mobee.InvalidValue, match="a batch of poses, of shape"):
+            read()
+    model.world.follow(batch)
+    with pytest.raises(mobee.InvalidValue, match="a batch of poses, of shape"):
+        model.world.detach("tool")
 
 
 def test_it_does_not_touch_its_own_link(model: mobee.Model) -> None:
