@@ -159,9 +159,10 @@ def _wrapped(notes: str) -> str:
 
 
 def _run(experiment: Experiment, options: argparse.Namespace) -> int:
+    folder: Path | None = options.resume
     try:
         own = {key: value for key, value in vars(options).items() if key not in _NOT_OPTIONS}
-        folder = options.resume or new_run(options.runs, experiment.name, own)
+        folder = folder or new_run(options.runs, experiment.name, own)
         with locked(folder):
             if options.resume:
                 keep_options(folder, experiment.name, own)
@@ -174,6 +175,8 @@ def _run(experiment: Experiment, options: argparse.Namespace) -> int:
     except CellsFailed as error:
         raise UserError(f"{error}\nRepeat them with `mobee experiment run {experiment.name} --resume {folder}`", FAILED) from None
     except KeyboardInterrupt:
+        if folder is None:  # there is nothing to resume yet
+            raise
         raise UserError(f"interrupted; resume with `mobee experiment run {experiment.name} --resume {folder}`", INTERRUPTED) from None
     if options.json:
         print(json.dumps({"run": str(folder), **results}, indent=2))

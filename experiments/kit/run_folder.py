@@ -49,8 +49,12 @@ def new_run(runs: Path, name: str, options: Mapping[str, Any]) -> Path:
             break
         except FileExistsError:  # two runs in one second get two folders
             number += 1
-    write(folder / CONFIG, {"experiment": name, "options": dict(options)})
-    write(folder / VERSIONS, _versions())
+    try:
+        write(folder / CONFIG, {"experiment": name, "options": dict(options)})
+        write(folder / VERSIONS, _versions())
+    except BaseException:  # a full disk or Ctrl-C: a folder without options could not be resumed
+        shutil.rmtree(folder)
+        raise
     return folder
 
 
@@ -85,10 +89,14 @@ def options_of(folder: Path, name: str) -> dict[str, Any]:
 def keep_options(folder: Path, name: str, options: Mapping[str, Any]) -> None:
     """Record new options of a run of the experiment `name` that is continued: write them into its config.json, if they have changed.
 
+    Then results.json is removed: its results are of the former options, and an interruption must not leave them with the new ones.
     `folder`: folder of the run.  `options`: all options of the run, by name.
     """
     if options_of(folder, name) != json.loads(json.dumps(options, default=str)):
-        write(folder / CONFIG, {"experiment": name, "options": dict(options)})
+        (folder / RESULTS).unlink(missing_ok=True)
+        with (folder / CONFIG).open("r+") as config:  # not replaced, because it is locked; not emptied first, because the disk may be full
+            config.write(_json({"experiment": name, "options": dict(options)}))
+            config.truncate()
 
 
 @contextmanager
@@ -136,8 +144,17 @@ def given_run(folder: Path, runs: Path, name: str) -> Path:
 
 
 def write(path: Path, content: Mapping[str, Any]) -> None:
-    """Write `content` as indented JSON to a file; values that JSON does not have are written as text."""
-    path.write_text(json.dumps(content, indent=2, default=str) + "\n")
+    """Write `content` as indented JSON to a file; values that JSON does not have are written as text.
+
+    If the file cannot be written, for example on a full disk, or if the program is killed, the former file stays as it is.
+    """
+    unfinished = path.with_suffix(".unfinished")
+    unfinished.write_text(_json(content))
+    unfinished.replace(path)
+
+
+def _json(content: Mapping[str, Any]) -> str:
+    return json.dumps(content, indent=2, default=str) + "\n"
 
 
 def read(path: Path) -> dict[str, Any]:

@@ -16,10 +16,12 @@ from experiments.claims.ch7_learning import hypercube_exploration
 from experiments.kit.run_folder import locked
 from experiments.registry import EXPERIMENTS
 from mobee.errors import InvalidValue
+from mobee_cli import experiment
 from mobee_cli.__main__ import main
 
 ROOT = Path(__file__).parents[2]
 QUICK = ("--robots", "katana", "--objects", "2", "--edits", "3")
+SHORT = ("--quick", "--jobs", "1")
 
 
 def test_list_names_every_experiment_with_its_claim(capsys):
@@ -172,6 +174,29 @@ def test_ctrl_c_leaves_the_finished_records_and_prints_how_to_continue(tmp_path)
     assert f"--resume {folder}" in err
     assert len(err.splitlines()) == 1
     assert "Traceback" not in out + err
+
+
+def test_ctrl_c_before_there_is_a_run_is_reported_in_one_line(tmp_path, monkeypatch, capsys):
+    def interrupted(runs, name, options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(experiment, "new_run", interrupted)
+    assert main(["experiment", "run", "model-throughput", *QUICK, "--runs", str(tmp_path)]) == 130
+    assert capsys.readouterr().err == "mobee experiment: interrupted\n"
+
+
+def test_an_interrupted_resume_with_more_seeds_leaves_no_results_of_fewer(tmp_path, monkeypatch, capsys):
+    assert main(["experiment", "run", "hypercube-exploration", *SHORT, "--seeds", "1", "--runs", str(tmp_path), "--json"]) == 0
+    folder = json.loads(capsys.readouterr().out)["run"]
+
+    def interrupted(settings, seed):
+        raise KeyboardInterrupt
+
+    stopped = replace(hypercube_exploration.EXPERIMENT, method=replace(hypercube_exploration.EXPERIMENT.method, trial=interrupted))
+    monkeypatch.setattr(hypercube_exploration, "EXPERIMENT", stopped)
+    assert main(["experiment", "run", "hypercube-exploration", "--resume", folder, "--seeds", "30"]) == 130
+    assert main(["experiment", "claims", folder]) == 2
+    assert f"{folder} has no results: finish the run" in capsys.readouterr().err
 
 
 def test_resume_without_a_name_continues_the_newest_run(tmp_path, capsys):
