@@ -16,7 +16,8 @@ from bus_schema import keys
 from bus_schema.messages import Clock, EStop, Motion, Tick, Turn
 from bus_schema.rpc import Done, Goal, ObjectState, ReachFor, Request, Started, Take, Taken, WithEpoch
 from mobee.arrays import Array
-from mobee.errors import ActionInterrupted, InvalidValue, MobeeError
+from mobee.control.forces import checked
+from mobee.errors import ActionInterrupted, InvalidValue, MobeeError, UnknownName
 from mobee.plant import Outcome
 from mobee.reach import Aim, ReachOutcome, ReachTarget
 from mobee.robot.robot import Robot
@@ -58,7 +59,7 @@ class BusPlant:
     """
 
     def __init__(self, service: Service, robot: Robot, parts: tuple[str, ...]) -> None:
-        self._service, self.robot = service, robot
+        self._service, self.robot, self._parts = service, robot, parts
         self._epochs: dict[str, int] = {}
         self._refused_since: dict[str, float] = {}  # monotonic clock
         self._motion: dict[str, Motion] = {}
@@ -98,8 +99,11 @@ class BusPlant:
 
         First takes the goal of the part (the right to set its attractor), if this service does not own it, and waits until the controller
         has the part under control, that is, until robot_sim follows its commands. Raises ActionInterrupted while this service rests
-        (between `rest` and `resume`), MobeeError if the goal belongs to another service for more than OWNED_PATIENCE (3 s).
+        (between `rest` and `resume`), MobeeError if the goal belongs to another service for more than OWNED_PATIENCE (3 s), UnknownName for
+        a part that is not one of this plant.
         """
+        if part not in self._parts:
+            raise UnknownName("part of this plant", part, self._parts)
         self._require_awake(part)
         self._wanted.add(part)
         while not (self._owns(part) and self._is_free(part)):
@@ -113,11 +117,13 @@ class BusPlant:
         """Set the part's attractor to `target` (n_part,) rad, and wait until the part has settled or timed out; return the outcome.
 
         The attractor is the posture to which the controller moves the part. Implements `mobee.plant.Plant.act`. If the controller ends, the
-        action continues as soon as another controller has the part under control. Raises InvalidValue for a target beyond the limits.
-        Raises ActionInterrupted if the part is in hold (it stands still and follows no commands) or has a fault; if robot_sim starts a new
-        run; if no controller can continue the action within 10 s; or if the controller gives the part's goal to another service.
+        action continues as soon as another controller has the part under control. Raises UnknownName for a part that is not one of this
+        plant. Raises InvalidValue for a target that is not n_part finite numbers, or is beyond the limits. Raises ActionInterrupted if the
+        part is in hold (it stands still and follows no commands) or has a fault; if robot_sim starts a new run; if no controller can
+        continue the action within 10 s; or if the controller gives the part's goal to another service.
         """
-        sent = self._perform(part, "goal", Goal, q=[float(x) for x in target])
+        q = checked(f"attractor of {part}", target, len(self.robot.part(part)))
+        sent = self._perform(part, "goal", Goal, q=q.tolist())
         return self._outcome(part, sent)
 
     def present(self, target: ReachTarget | None) -> None:
