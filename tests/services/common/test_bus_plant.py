@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: Apache-2.0
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from mobee import load_robot
+from mobee.errors import InvalidValue, MobeeError, UnknownName
+from services.common.bus_plant import BusPlant
+from services.common.config import ServiceConfig
+from services.common.service import Service
+from tests.services.fake_controller import FakeController
+from tests.services.harness import rig
+
+ROBOT = load_robot("icub")
+
+
+@pytest.fixture(scope="module")
+def plant(tmp_path_factory: pytest.TempPathFactory) -> Iterator[BusPlant]:
+    with rig(tmp_path_factory.mktemp("plant"), ROBOT) as made, Service("test", ServiceConfig(endpoint=made.endpoint), ROBOT) as service:
+        controller = FakeController(made, "torso")
+        yield BusPlant(service, ROBOT, ("torso",))
+        controller.close()
+
+
+@pytest.mark.parametrize(
+    ("part", "target", "error", "says"),
+    [
+        ("head", np.zeros(6), UnknownName, "unknown part of this plant 'head'. Valid: torso."),
+        ("tail", np.zeros(6), UnknownName, "unknown part 'tail'"),
+        ("torso", np.array([0.0, np.nan, 0.0]), InvalidValue, "number 1 is nan; must be 3 finite numbers"),
+        ("torso", np.zeros(2), InvalidValue, "must be 3 finite numbers"),
+    ],
+)
+def test_a_part_or_target_that_cannot_be_is_refused_at_once(
+    plant: BusPlant, part: str, target: np.ndarray, error: type[MobeeError], says: str
+) -> None:
+    with pytest.raises(error, match=says):
+        plant.act(part, target)
+
+
+def test_a_part_of_the_robot_that_is_not_one_of_the_plant_is_not_measured(plant: BusPlant) -> None:
+    with pytest.raises(UnknownName, match="part of this plant"):
+        plant.measure("head")
+    assert len(plant.measure("torso")) == 3
