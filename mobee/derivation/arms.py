@@ -9,7 +9,7 @@ limited to one turn.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -222,12 +222,16 @@ def names_of(groups: Sequence[Sequence[str]]) -> list[str]:
     """
     names: list[str] = []
     for motors in groups:
-        name = _name(motors, len(groups) == 1)
-        free, number = name, 2
-        while free in names:
-            free, number = f"{name}_{number}", number + 1
-        names.append(free)
+        names.append(free_name(_name(motors, len(groups) == 1), names))
     return names
+
+
+def free_name(name: str, taken: Container[str]) -> str:
+    """Return the name, with a number from 2 on appended if it is one of the `taken` names."""
+    free, number = name, 2
+    while free in taken:
+        free, number = f"{name}_{number}", number + 1
+    return free
 
 
 def _name(motors: Sequence[str], alone: bool) -> str:

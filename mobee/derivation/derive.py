@@ -13,7 +13,7 @@ import numpy as np
 
 from mobee.arrays import Array, checked_seed
 from mobee.control.gains import Gains
-from mobee.derivation.arms import Chain, bounded, chains, joints_to_learn, movements, names_of
+from mobee.derivation.arms import Chain, bounded, chains, free_name, joints_to_learn, movements, names_of
 from mobee.derivation.separation import field_width, free_home, home_apart, often_touching, reach_of, with_cuts, with_fields, without_links
 from mobee.errors import InvalidValue
 from mobee.learning.lattice import Lattice
@@ -194,10 +194,10 @@ def _parted(robot: Robot, arms: list[tuple[Arm, Chain]], drive: dict[int, int]) 
         hand = tuple(motor for motor in hand if motor not in dealt)
         dealt |= set(hand)
         if hand:
-            groups["hand" if len(arms) == 1 else f"{name}_hand"] = hand
+            groups[free_name("hand" if len(arms) == 1 else f"{name}_hand", {*groups, *names})] = hand
     left = tuple(motor for motor in robot.motors if motor not in dealt)
     if left:
-        groups["body"] = left
+        groups[free_name("body", groups)] = left
     return _regrouped(robot, groups), [(replace(arm, part=name), chain) for name, (arm, chain) in zip(names, arms, strict=True)]
 
 

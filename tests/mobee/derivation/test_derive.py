@@ -57,6 +57,28 @@ def test_the_legs_of_a_quadruped_are_its_arms(tmp_path: Path) -> None:
     assert not Model(derived.robot).evaluate(derived.robot.home).contacts
 
 
+def test_arms_named_as_the_body_or_as_a_hand_keep_their_motors(tmp_path: Path) -> None:
+    trunk = limb("column", 0.0, 0.0, 0.0)
+    above = [
+        limb(name, x, 0.0, -0.3).replace('parent link="trunk"', 'parent link="column_link2"') for name, x in (("body", 0.2), ("tool", -0.2))
+    ]
+    robot = urdf(tmp_path, trunk, *above)
+    derived = derive(robot)
+    assert set(derived.robot.parts) == {"body", "tool", "body_2"}
+    assert set(derived.robot.motors) == set(robot.motors)
+    fingers = [
+        f'<link name="{name}"><collision><geometry><sphere radius="0.01"/></geometry></collision></link>'
+        f'<joint name="{name}" type="revolute"><parent link="left_arm_link2"/><child link="{name}"/>'
+        f'<origin xyz="0 {y} -0.3"/><axis xyz="1 0 0"/>'
+        '<limit lower="-0.5" upper="0.5" velocity="1" effort="9"/></joint>'
+        for name, y in (("finger", 0.05), ("thumb", -0.05))
+    ]
+    robot = urdf(tmp_path, limb("left_arm", 0.2, 0.0, 0.0), *fingers, limb("left_arm_hand", -0.2, 0.0, 0.0))
+    derived = derive(robot)
+    assert set(derived.robot.parts) == {"left_arm", "left_arm_hand_2", "left_arm_hand"}
+    assert set(derived.robot.motors) == set(robot.motors)
+
+
 def test_an_arm_with_a_gripper_keeps_the_fingers_apart(tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
     with warnings.catch_warnings():
