@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
 from mobee.gymnasium.registration import LATTICE_STEPS
-from mobee.gymnasium.robots import ARM, FRAMES_PER_S, SEEDS, Portrait, RobotFile, RobotVectorEnv, WorldFile, model_of, plant_settings
+from mobee.gymnasium.robots import ARM, FRAMES_PER_S, SEEDS, Portrait, RobotFile, RobotVectorEnv, WorldFile, model_of, plant_settings, whole
 from mobee.learning.goal import target_states
 from mobee.learning.lattice import Lattice, Levels
 from mobee.learning.transitions import TransitionModel
@@ -86,10 +86,12 @@ class _Arm:
     def restart(self, rng: np.random.Generator, options: dict[str, Any] | None) -> dict[str, Any]:
         """Put the robot at home, and move it to the state of the options, if there is one; returns the info."""
         lattice = self._lattice
-        self.plant.restart(int(rng.integers(SEEDS)))
         start = (options or {}).get("state")
-        if start is not None:
-            (state,) = target_states(lattice.space, [start]).tolist()
+        states = [] if start is None else target_states(lattice.space, start).tolist()
+        if len(states) > 1:
+            raise InvalidValue(f"state: {start!r}: give the number of one state.")
+        self.plant.restart(int(rng.integers(SEEDS)))
+        for state in states:
             self.plant.act(lattice.part, lattice.space.target(state))
         self.state = self._measured()
         return {"action_mask": lattice.masks[self.state].copy(), "q": self.plant.measure(lattice.part)}
@@ -185,8 +187,9 @@ class LatticeEnv(Env[Any, Any]):
         `action`: its number among the actions of the present state, see the class. Return the state reached, the reward, whether the
         goal was reached (it ends the episode), False (never truncated here), and info.
         """
-        outcome = self._arm.plant.advance()[0][1] if self._arm.begin(int(action)) else None
-        state, reward, over, info = self._arm.end(int(action), outcome)
+        action = whole("action", action)
+        outcome = self._arm.plant.advance()[0][1] if self._arm.begin(action) else None
+        state, reward, over, info = self._arm.end(action, outcome)
         return state, reward, over, False, info
 
     def render(self) -> Picture | None:
@@ -250,7 +253,10 @@ class LatticeVectorEnv(RobotVectorEnv):
         `actions`: (num_envs,), the index of a neighbour of each robot's state, as in `LatticeEnv`. Return states, rewards (0 for a robot
         that begins an episode), whether goals were reached, whether episodes are truncated, each (num_envs,), and infos.
         """
-        chosen, over = np.asarray(actions).tolist(), self._over
+        given, over = np.asarray(actions), self._over
+        if given.shape != (self.num_envs,) or given.dtype.kind not in "iu":
+            raise InvalidValue(f"actions {given.tolist()!r}: give a whole number for each of the {self.num_envs} robots.")
+        chosen = given.tolist()
         moving = [not done and arm.begin(action) for arm, action, done in zip(self._arms, chosen, over.tolist(), strict=True)]
         plants = [arm.plant for arm, moves in zip(self._arms, moving, strict=True) if moves]
         outcomes = iter(advance_together(plants, self._threads) if plants else [])

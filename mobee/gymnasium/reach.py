@@ -15,7 +15,7 @@ from gymnasium import Env
 from gymnasium.spaces import Box, Dict
 from numpy.typing import ArrayLike, NDArray
 
-from mobee.arrays import Array, Ints
+from mobee.arrays import Array, Ints, real_array
 from mobee.errors import InvalidValue, MobeeError
 from mobee.gymnasium.registration import REACH_STEPS
 from mobee.gymnasium.robots import (
@@ -84,6 +84,10 @@ class _Reaching:
         part, self.joints = checked_joints(robot, task.joints)
         self.part, self.marker = part.name, robot.marker(task.marker).name
         self.low, self.high = robot.limits[self.joints].T
+        q = np.tile(robot.home, (3, 1))
+        q[:, self.joints] = self.low + np.multiply.outer([0.25, 0.5, 0.75], self.high - self.low)
+        if not np.ptp(self.model.evaluate(q).position(self.marker), axis=0).any():
+            raise InvalidValue(f"marker={task.marker!r} is moved by none of {', '.join(task.joints)}: take one that {self.part} carries.")
         self.plant_settings = plant_settings(task.plant, [self.part])
         self.ticks = max(1, round(task.period / self.plant_settings.dt))
         self.step, self.tolerance, self.sparse = task.step, task.tolerance, task.reward == "sparse"
@@ -216,7 +220,8 @@ class ReachEnv(Env[Any, Any]):
         An attractor is the position to which the control law pulls a joint.
         Return observation, reward, False (never terminated), False (never truncated here), and info.
         """
-        ((solid, field),) = self._reaching.move(self._robots, _ONLY, np.asarray(action, dtype=np.float64)[None])
+        actions = _checked_actions(action, self.action_space.shape)[None]
+        ((solid, field),) = self._reaching.move(self._robots, _ONLY, actions)
         seen = self._observed()
         reward, reached = self._reaching.judge(seen["achieved_goal"], self._goal)
         return seen, float(reward), False, False, {"is_success": bool(reached), "solid_depth": float(solid), "field_depth": float(field)}
@@ -240,6 +245,14 @@ class ReachEnv(Env[Any, Any]):
 
     def _observed(self) -> Observation:
         return {name: rows[0] for name, rows in self._reaching.observe(self._robots, self._goal[None]).items()}
+
+
+def _checked_actions(given: ArrayLike, shape: tuple[int, ...] | None) -> Array:
+    """Return actions as an array; raises InvalidValue for another shape than `shape`, or for NaN."""
+    actions = real_array("action", given)
+    if actions.shape != shape or np.isnan(actions).any():
+        raise InvalidValue(f"action of shape {actions.shape}: give numbers in [-1, 1], shape {shape}, and no NaN.")
+    return actions
 
 
 def _chosen_goals(options: dict[str, Any] | None, drawn: Array) -> Array:
@@ -316,7 +329,7 @@ class ReachVectorEnv(RobotVectorEnv):
         """
         begun, depths = self._over, np.zeros((self.num_envs, 2))
         going = np.flatnonzero(~begun)
-        depths[going] = self._reaching.move(self._robots, going, np.asarray(actions, dtype=np.float64)[going])
+        depths[going] = self._reaching.move(self._robots, going, _checked_actions(actions, self.action_space.shape)[going])
         for number in np.flatnonzero(begun).tolist():
             self._begin(number)
         seen = self._reaching.observe(self._robots, self._goals)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
+from operator import index
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from mobee.errors import InvalidValue
 from mobee.model.model import Model
 from mobee.model.pose import Pose
 from mobee.model.world import World
@@ -85,6 +87,14 @@ def plant_settings(given: PlantSettings | None, parts: Sequence[str]) -> PlantSe
     return settings if settings.active is not None else replace(settings, active=tuple(parts))
 
 
+def whole(what: str, given: Any) -> int:
+    """Return a whole number as an int; raises InvalidValue for another number. `what`: what the number is, for the message."""
+    try:
+        return index(given)
+    except TypeError:
+        raise InvalidValue(f"{what} {given!r}: give a whole number.") from None
+
+
 class Portrait:
     """Draws pictures of the robot of a model in its world, always with the same camera."""
 
@@ -111,11 +121,17 @@ class RobotVectorEnv(VectorEnv[Any, Any, Any]):
         max_episode_steps: number of steps after which an episode is truncated.
         observations: the space of one robot's observations.
         actions: the space of one robot's actions.
+
+    Raises:
+        InvalidValue: fewer than one robot or step.
     """
 
     metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}
 
     def __init__(self, num_envs: int, max_episode_steps: int, observations: Space[Any], actions: Space[Any]) -> None:
+        for name, number in (("num_envs", num_envs), ("max_episode_steps", max_episode_steps)):
+            if whole(name, number) < 1:
+                raise InvalidValue(f"{name} {number!r}: give 1 or more.")
         self.num_envs, self.render_mode, self._most = num_envs, None, max_episode_steps
         self.single_observation_space, self.single_action_space = observations, actions
         self.observation_space, self.action_space = batch_space(observations, num_envs), batch_space(actions, num_envs)
@@ -133,6 +149,8 @@ class RobotVectorEnv(VectorEnv[Any, Any, Any]):
             seeds: Sequence[int | None] = [None] * self.num_envs
         else:
             seeds = seed if isinstance(seed, Sequence) else [seed + number for number in range(self.num_envs)]
+        if len(seeds) != self.num_envs:
+            raise InvalidValue(f"{len(seeds)} seeds: give one for each of the {self.num_envs} robots, or the first of consecutive seeds.")
         self._rngs = [rng if one is None else np_random(one)[0] for rng, one in zip(self._rngs, seeds, strict=True)]
         self._steps[:], self._over[:] = 0, False
 

@@ -13,7 +13,7 @@ from gymnasium.spaces import Discrete
 from gymnasium.utils.seeding import np_random
 
 from mobee.errors import InvalidValue, NotInstalled, UnknownName
-from mobee.gymnasium.robots import ARM, FRAMES_PER_S, SEEDS, Portrait, RobotFile, WorldFile, model_of, plant_settings
+from mobee.gymnasium.robots import ARM, FRAMES_PER_S, SEEDS, Portrait, RobotFile, WorldFile, model_of, plant_settings, whole
 from mobee.learning.lattice import Lattice, Levels
 from mobee.learning.transitions import TransitionModel
 from mobee.plant import Outcome
@@ -133,9 +133,12 @@ class TableEnv(ParallelEnv[str, int, int]):  # type: ignore[misc]  # PettingZoo 
         ignored. Return states, rewards, terminated (always False), truncated (True after `steps` steps) and infos, each a dict by agent.
         The infos are explained at the class.
         """
+        for name in actions:
+            if name not in self.spaces:
+                raise UnknownName("agent", name, self.spaces)
         for part in self.agents:
             if part not in self._under_way and part in actions:
-                self._begin(part, int(actions[part]))
+                self._begin(part, whole("action", actions[part]))
         ended = dict(self.plant.advance()) if self._under_way else {}
         self._steps += 1
         rewards, infos = {}, {}

@@ -129,6 +129,22 @@ def test_a_wrong_setting_is_refused(changes: dict[str, Any], message: str) -> No
             kind(**{**SHORT, **changes})
 
 
+def test_an_action_or_a_state_that_is_no_number_of_one_is_refused() -> None:
+    alone, both = LatticeEnv(**SHORT), LatticeVectorEnv(2, **SHORT)
+    alone.reset(seed=0)
+    both.reset(seed=0)
+    for action in (1.7, float("nan"), [1, 2], None):
+        with pytest.raises(InvalidValue, match="action"):
+            alone.step(action)  # type: ignore[arg-type]
+    for actions in ([1.0, 0.0], [1], [0, 0, 0], 1):
+        with pytest.raises(InvalidValue, match="actions"):
+            both.step(np.array(actions))
+    for env in (alone, both):
+        with pytest.raises(InvalidValue, match="give the number of one state"):
+            env.reset(options={"state": [1, 2]})
+    assert alone.reset(options={"state": np.int64(5)})[0] == 5
+
+
 def test_a_picture_shows_what_moved() -> None:
     env = LatticeEnv("rgb_array", **SHORT)
     env.reset(seed=0)

@@ -13,7 +13,7 @@ from gymnasium.utils.env_checker import check_env
 
 import mobee
 from mobee.errors import InvalidValue, MobeeError
-from mobee.gymnasium import ReachEnv, ReachTask
+from mobee.gymnasium import ReachEnv, ReachTask, ReachVectorEnv
 from mobee.gymnasium.reach import extent
 from mobee.gymnasium.robots import guarded
 
@@ -136,4 +136,28 @@ def test_a_task_without_a_place_to_rest_and_a_wrong_setting_are_refused() -> Non
     for wrong in ({"period": 0.0}, {"reward": "large"}, {"marker": "left_plam"}, {"tolerance": -1.0}):
         with pytest.raises(MobeeError):
             ReachEnv(**wrong)
+    with pytest.raises(InvalidValue, match="'right_palm' is moved by none of l_shoulder_pitch"):
+        ReachEnv(marker="right_palm")
     assert ReachTask().reward == "sparse"
+
+
+@pytest.mark.parametrize("action", [0.5, [0.5], [0.5] * 3, np.zeros((4, 1)), [np.nan, 0.0, 0.0, 0.0], "left", [1j] * 4])
+def test_an_action_that_is_not_a_number_for_each_joint_is_refused(action: Any) -> None:
+    env = ReachEnv()
+    env.reset(seed=0)
+    before = env.plant.time
+    with pytest.raises(InvalidValue, match="action"):
+        env.step(action)
+    assert env.plant.time == before
+
+
+def test_wrong_numbers_of_robots_steps_seeds_and_actions_are_refused() -> None:
+    for wrong in ({"num_envs": 0}, {"num_envs": 1.5}, {"max_episode_steps": 0}):
+        with pytest.raises(InvalidValue, match=next(iter(wrong))):
+            ReachVectorEnv(**wrong)
+    envs = ReachVectorEnv(3)
+    with pytest.raises(InvalidValue, match="2 seeds: give one for each of the 3 robots"):
+        envs.reset(seed=[1, 2])
+    for count in (2, 4):
+        with pytest.raises(InvalidValue, match=r"shape \(3, 4\)"):
+            envs.step(np.zeros((count, 4)))

@@ -61,6 +61,16 @@ def test_a_part_whose_action_does_not_exist_rests() -> None:
     assert after == seen and env.plant.time == 0.0 and infos["torso"]["ready"]
 
 
+def test_an_action_of_an_unknown_agent_or_of_a_fraction_is_refused() -> None:
+    env = TableEnv()
+    env.reset(seed=0)
+    with pytest.raises(mobee.UnknownName, match="unknown agent 'left_arn'. Did you mean 'left_arm'"):
+        env.step({"left_arn": 1})
+    with pytest.raises(mobee.InvalidValue, match="action 1.5: give a whole number"):
+        env.step({"torso": 1.5})  # type: ignore[dict-item]
+    assert env.plant.time == 0.0
+
+
 def test_joints_of_another_part_are_refused() -> None:
     with pytest.raises(mobee.InvalidValue, match="give motors of torso"):
         TableEnv(parts={"torso": ("l_elbow", "l_shoulder_yaw")})
@@ -72,4 +82,6 @@ def test_neighbours_of_another_part_and_episodes_without_steps_are_refused() -> 
         TableEnv(parts=arm, neighbours={"left_arn": 2})
     with pytest.raises(mobee.InvalidValue, match="steps"):
         TableEnv(parts=arm, steps=0)
+    with pytest.raises(mobee.InvalidValue, match="steps=2.5"):
+        TableEnv(parts=arm, steps=2.5)
     assert TableEnv(parts=arm, neighbours={"left_arm": 2}).action_space("left_arm").n == 2
