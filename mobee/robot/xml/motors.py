@@ -83,23 +83,29 @@ def finish_joints(
     """Return the finished joints and motors: joints with limits in SI units, motors with the affine maps to their joints (thesis 2.3.1).
 
     Each map takes the motor's range to the joint's range. `drives`: for each joint, its element and the name of its motor. `motors`: in
-    the order of q. Raises RobotFileError for an unknown motor, a motor without a joint, and a joint that cannot move.
+    the order of q. Raises RobotFileError for an unknown motor, a motor without a joint, a joint that cannot move, and a joint without an
+    interval whose unit is not that of its motor.
     """
     places = {motor.name: k for k, motor in enumerate(motors)}
     driven: list[list[tuple[int, float, float]]] = [[] for _ in motors]
     finished = []
     for index, (joint, (node, name)) in enumerate(zip(joints, drives, strict=True)):
         motor = motors[places[node.choice("motor", name, places, "motor")]]
+        slides = joint.kind == "prismatic"
+        if slides != motor.in_metres and not {"minPos", "maxPos"} <= set(node.attributes):
+            unit, other = ("metres", "degrees") if slides else ("degrees", "metres")
+            remedy = f'Write minPos and maxPos of the joint in {unit}, or unit="{"m" if slides else "deg"}" in the motor'
+            node.fail("minPos", f"joint {joint.name!r} moves in {unit}, and its motor {name!r} in {other}", remedy)
         low, high = node.number("minPos", motor.low), node.number("maxPos", motor.high)
         if low == high:
             node.fail(
                 "minPos", f"equals maxPos {high:g}, so the joint cannot move", 'Write type="fixed" without limits, or another interval'
             )
         span = motor.si(motor.high - motor.low)
-        unit = np.deg2rad(1.0) if joint.kind == "revolute" else 1.0
-        scale = (high - low) * unit / span
-        driven[places[name]].append((index, float(scale), float(low * unit - scale * motor.si(motor.low))))
-        finished.append(replace(joint, limits=np.array([min(low, high), max(low, high)]) * unit))
+        si = 1.0 if slides else np.deg2rad(1.0)
+        scale = (high - low) * si / span
+        driven[places[name]].append((index, float(scale), float(low * si - scale * motor.si(motor.low))))
+        finished.append(replace(joint, limits=np.array([min(low, high), max(low, high)]) * si))
     for motor, joints_of_motor in zip(motors, driven, strict=True):
         if not joints_of_motor:
             motor.node.fail("name", f"motor {motor.name!r} drives no joint", f'Write <joint motor="{motor.name}" ...>')

@@ -208,6 +208,15 @@ BAD = {
     "limits swapped": ('<motor name="tilt" minPos="2" maxPos="1"/>', "<motor> minPos: 2 is not below maxPos 1. Swap the two"),
     "home outside": ('<motor name="tilt" minPos="0" maxPos="1" home="5"/>', "<motor> home: 5 is outside of 0 .. 1"),
     "idle motor": ('<motor name="tilt" minPos="0" maxPos="1"/>', "<motor> name: motor 'tilt' drives no joint"),
+    "slide in degrees": (
+        '<motor name="t" minPos="0" maxPos="90"><joint z="1" type="prismatic"/></motor>',
+        "<joint> minPos: joint 't' moves in metres, and its motor 't' in degrees. "
+        'Write minPos and maxPos of the joint in metres, or unit="m" in the motor',
+    ),
+    "hinge in metres": (
+        '<motor name="t" unit="m" minPos="0" maxPos="1"><joint z="1" minPos="5"/></motor>',
+        "<joint> minPos: joint 't' moves in degrees, and its motor 't' in metres",
+    ),
     "stiff joint": ('<joint name="j" motor="pan" z="1" minPos="3" maxPos="3"/>', "<joint> minPos: equals maxPos 3"),
     "second motor": (MOTOR, "<motor> name: a second motor 'pan'. The first is in line 3"),
     "second joint": ('<joint name="pan" motor="pan" z="1"/>', "<joint> name: a second joint 'pan'"),
