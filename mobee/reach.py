@@ -51,10 +51,11 @@ class ReachTarget:
         object.__setattr__(self, "position", where + 0.0)  # -0 and 0 are one position, also where its bytes are the key
         if self.normal is not None:
             normal = _triple(self.normal, "normal")
-            length = float(np.linalg.norm(normal))
-            if length == 0.0:
+            longest = float(np.abs(normal).max())
+            if longest == 0.0:
                 raise InvalidValue("normal of the target: must not be all 0")
-            object.__setattr__(self, "normal", normal / length)
+            normal = np.ldexp(normal, -int(np.frexp(longest)[1]))  # an exact scaling, after which its square does not overflow or become 0
+            object.__setattr__(self, "normal", normal / float(np.linalg.norm(normal)))
 
     def missing(self, marker: Array) -> float:
         """Return the remaining distance [m] from a marker at `marker` (3,) m, root frame, to the target: |x - x*| of thesis eq. 8.4.

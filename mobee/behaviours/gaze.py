@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from mobee.arrays import Array, Ints
 from mobee.behaviours.tracking import Reference
+from mobee.control.forces import checked
 from mobee.errors import InvalidValue
 from mobee.model.kinematics import cross, joint_axes, link_transforms, tables
 from mobee.robot.cameras import camera_frame
@@ -116,7 +117,14 @@ class Gaze:
             target: (3,) m, root frame, at the time of `q`.
             target_velocity: (3,) m/s, root frame.
             dt: time since the last call [s].
+
+        Raises:
+            InvalidValue: an argument has another shape, or a number is not finite, or `dt` is not above 0; then nothing changes.
         """
+        q, velocity = (checked(name, one, len(self.robot.motors)) for name, one in (("q", q), ("velocity", velocity)))
+        target, target_velocity = checked("target", target, 3), checked("target_velocity", target_velocity, 3)
+        if not 0.0 < dt < np.inf:
+            raise InvalidValue(f"dt {dt} s: must be a finite time above 0")
         span, error = self.part.slice, self.error(q, target)
         self._phase = "saccade" if error > SACCADE_ABOVE else "pursuit" if error < PURSUIT_BELOW else self._phase
         there = q + self.lag * velocity

@@ -15,7 +15,8 @@ import numpy as np
 
 from mobee._core import Table, address, view
 from mobee._core import law as core
-from mobee.arrays import Array, Ints, real_array
+from mobee.arrays import Array, Ints
+from mobee.control.forces import checked
 from mobee.control.law import Law
 from mobee.errors import InvalidValue
 from mobee.model.kinematics import tables
@@ -85,7 +86,7 @@ def reach_path(
     if not (tolerance > 0 and steps > 0):
         raise InvalidValue(f"tolerance {tolerance} and {steps} steps: both must be above 0")
     low, high = model.robot.limits.T
-    path = [real_array("start", start)]
+    path = [checked("start", start, len(low))]
     here = marker_error(model, marker, target, path[0])
     end: Literal["reached", "stuck", "steps used up"] = "steps used up"
     while True:
@@ -197,9 +198,12 @@ class Reacher:
         """Return the status at the measured q (n,) rad, dt [s] after the last update: "reaching", "reached" or "stuck".
 
         "stuck": the marker came no nearer for 3 s, because the target is out of reach, or limits, clauses, contacts or springs prevent the
-        motion. The force on the marker continues after every status; `stop` ends it.
+        motion. The force on the marker continues after every status; `stop` ends it. Raises InvalidValue if q has another shape or is not
+        finite, or if dt is not a finite time above 0.
         """
-        found = marker_error(self._controller.model, self._marker, self.target, real_array("q", q))
+        if not 0.0 < dt < np.inf:
+            raise InvalidValue(f"dt {dt} s: must be a finite time above 0")
+        found = marker_error(self._controller.model, self._marker, self.target, checked("q", q, len(self._controller.robot.motors)))
         self.angle = found.angle
         self._seen += (found.error - self._seen) * (1.0 if np.isinf(self.distance) else min(1.0, dt / SMOOTHING_TIME))
         self.distance = float(np.linalg.norm(self._seen[:3]))
@@ -214,9 +218,10 @@ class Reacher:
     def stop(self, q: Array) -> None:
         """End the pull, and set the attractor of all motors that move the marker to q (n,) rad, so that the marker stays.
 
-        The attractor is the goal of the control law's springs.
+        The attractor is the goal of the control law's springs. Raises InvalidValue if q has another shape or is not finite.
         """
         controller = self._controller
+        q = checked("q", q, len(controller.robot.motors))
         controller.end_reach(None)
         moved = np.abs(controller.model.jacobian(q, self._marker)).max(axis=0) > 0
         controller.attractor = np.where(moved, q, controller.attractor)

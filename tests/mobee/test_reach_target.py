@@ -48,3 +48,10 @@ def test_a_marker_either_faces_the_target_or_has_a_normal() -> None:
 
 def test_a_negative_zero_is_the_same_position() -> None:
     assert ReachTarget(np.array([0.3, -0.0, 0.5])).position.tobytes() == ReachTarget(np.array([0.3, 0.0, 0.5])).position.tobytes()
+
+
+@pytest.mark.parametrize("size", [1e-320, 1e-200, 1.0, 1e200, 1e308])
+def test_a_normal_of_any_length_is_scaled_to_1(size: float) -> None:
+    assert ReachTarget(np.zeros(3), normal=size * np.array([0.0, 1.0, -1.0])).normal == pytest.approx(
+        [0.0, np.sqrt(0.5), -np.sqrt(0.5)], rel=1e-3
+    )

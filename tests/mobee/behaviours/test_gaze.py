@@ -127,3 +127,15 @@ def test_a_target_in_the_middle_of_both_pictures_moves_nothing() -> None:
     assert gaze.error(q, target) < 1e-6
     moved = gaze.step(q, np.zeros(41), target, np.zeros(3), DT)
     assert moved.phase == "pursuit" and np.abs(moved.velocity).max() < 0.05
+
+
+@pytest.mark.parametrize("name", ["q", "velocity", "target", "target_velocity", "dt"])
+def test_an_invalid_step_is_refused_and_changes_nothing(name: str) -> None:
+    given = {"q": ROBOT.home, "velocity": 0.0 * ROBOT.home, "target": np.array([-0.4, 0.1, 0.1]), "target_velocity": np.zeros(3), "dt": DT}
+    gaze, undisturbed = new_gaze(), new_gaze()
+    for one in (gaze, undisturbed):
+        one.step(**given)
+    for wrong in (np.nan * given[name], 0.0) if name == "dt" else (np.nan * given[name], given[name][:2]):
+        with pytest.raises(InvalidValue, match=name):
+            gaze.step(**{**given, name: wrong})
+    assert np.array_equal(gaze.step(**given).q, undisturbed.step(**given).q)

@@ -109,3 +109,6 @@ def test_an_invalid_target_is_refused() -> None:
         reach_path(ARM, "tip", np.zeros(3), BENT, normal=np.zeros(3))
     with pytest.raises(InvalidValue, match="tolerance -1"):
         reach_path(ARM, "tip", np.zeros(3), BENT, tolerance=-1.0)
+    for start in (np.stack([BENT, BENT]), BENT[:2], np.nan * BENT):
+        with pytest.raises(InvalidValue, match="start.*finite numbers"):
+            reach_path(ARM, "tip", np.zeros(3), start)

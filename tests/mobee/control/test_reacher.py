@@ -207,3 +207,16 @@ def test_an_invalid_reach_is_refused() -> None:
         Reacher(controller, "tip", np.zeros(3), tolerance=0.0)
     with pytest.raises(InvalidValue, match="the robot cannot reach with tip on link3: none of the motors"):
         Reacher(Controller(PLANAR, Gains.default().with_motors("*", weight=0)), "tip", np.zeros(3))
+
+
+@pytest.mark.parametrize("wrong", [np.zeros((2, 3)), np.zeros(2), np.full(3, np.nan)], ids=["batch", "short", "nan"])
+def test_an_invalid_pose_or_time_is_refused(wrong: Array) -> None:
+    controller = Controller(PLANAR)
+    reacher = Reacher(controller, "tip", np.zeros(3))
+    for call in (lambda: reacher.update(wrong, 0.01), lambda: reacher.stop(wrong)):
+        with pytest.raises(InvalidValue, match="q.*finite numbers"):
+            call()
+    for dt in (0.0, -0.01, np.nan):
+        with pytest.raises(InvalidValue, match="dt .*above 0"):
+            reacher.update(np.zeros(3), dt)
+    assert controller.reaches.markers == ("tip",)
