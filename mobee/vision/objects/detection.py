@@ -6,6 +6,7 @@ A detector finds them; `by_color` makes one that finds the colours of the things
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -77,7 +78,18 @@ def outlined(name: str, likeness: NDArray[np.float32]) -> list[Detection]:
 
 
 def by_color(things: Sequence[Thing]) -> Detector:
-    """Return a detector that finds regions with the colours of the given things."""
+    """Return a detector that finds regions with the colours of the given things.
+
+    Warns of each thing that is black, white or nearly grey, and does not look for it: such a colour has no hue that could be found.
+    """
+    for thing in things:
+        if not _has_hue(thing.color):
+            warnings.warn(
+                f"the detector by colour cannot find {thing.name!r}: its colour {thing.color} has no hue. "
+                "Give it another colour, or use a trained detector (mobee detector train)",
+                stacklevel=2,
+            )
+    things = [thing for thing in things if _has_hue(thing.color)]
 
     def detect(picture: Picture) -> list[Detection]:
         channels = np.ascontiguousarray(picture.reshape(-1, 3).T)
@@ -94,17 +106,28 @@ def by_color(things: Sequence[Thing]) -> Detector:
     return detect
 
 
+def _chroma(color: Color) -> NDArray[np.float32]:
+    """Return the colour without its grey, (3,)."""
+    wanted = np.array(color, np.float32)
+    chroma: NDArray[np.float32] = wanted - wanted.mean()
+    return chroma
+
+
+def _has_hue(color: Color) -> bool:
+    """Return whether a pixel of this colour can be brighter of it than the noise (LEAST)."""
+    return float(np.linalg.norm(_chroma(color))) >= LEAST / 255.0
+
+
 def _likeness(pixels: NDArray[np.float32], color: Color) -> NDArray[np.float32]:
     """Return for each pixel of `pixels` (3, m) how much of a colour it has, (m,): 0 if it is too pale or has another hue.
 
     Else the value is proportional to the share of the pixel that has this colour.
     """
-    wanted = np.array(color, np.float32)
-    chroma = wanted - wanted.mean()
+    chroma = _chroma(color)
     strength = float(np.linalg.norm(chroma))
     chroma /= strength
     along: NDArray[np.float32] = chroma @ pixels
-    along[along < np.maximum(LEAST, PALE * strength / float(wanted.max()) * pixels.max(axis=0))] = 0.0
+    along[along < np.maximum(LEAST, PALE * strength / max(color) * pixels.max(axis=0))] = 0.0
     some = np.flatnonzero(along)
     chosen = pixels[:, some]
     across = ((chosen - chosen.mean(axis=0)) ** 2).sum(axis=0) - along[some] ** 2

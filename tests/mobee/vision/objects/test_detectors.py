@@ -66,6 +66,14 @@ def test_other_colours_pale_and_dark_ones_are_not_found() -> None:
         assert detect(picture_with(color)) == []
 
 
+@pytest.mark.parametrize("color", [(0.0, 0.0, 0.0), (1.0, 1.0, 1.0), (0.4, 0.4, 0.42)])
+def test_a_thing_whose_colour_has_no_hue_is_left_out_with_a_warning(color: tuple[float, float, float]) -> None:
+    grey = Thing("pot", "sphere", (0.03,), color)
+    with pytest.warns(UserWarning, match="cannot find 'pot': its colour .* has no hue"):
+        detect = detector_of("color", [grey, *THINGS])
+    assert [one.name for one in detect(picture_with(BLUE))] == ["cup"]
+
+
 def test_what_is_cut_by_the_border_has_less_confidence_and_a_torn_region_is_left_out() -> None:
     detect = detector_of("color", [Thing("cup", "cylinder", (0.035, 0.09), (0.05, 0.3, 0.85))])
     whole, cut = detect(picture_with(BLUE))[0], detect(picture_with(BLUE)[:, 150:])[0]
