@@ -57,6 +57,13 @@ def lengths(vectors: Array) -> Array:
     return found
 
 
+def finite(name: str, given: float) -> float:
+    """Return the number `given`; raise InvalidValue, with `name` in its text, if it is not finite."""
+    if not np.isfinite(given):
+        raise InvalidValue(f"{name} is {given!r}; it must be a finite number.")
+    return given
+
+
 def units(vectors: Array) -> Array:
     """Return vectors (..., d) scaled to length 1; zero vectors stay zero."""
     found: Array = vectors / np.maximum(lengths(vectors)[..., None], 1e-12)
@@ -118,7 +125,7 @@ def orientation(
     is smallest for opposite directions, and its slope is 0 at both ends. A residual of at most `tolerance` (5 degrees) meets the term; the
     cost is `weight` (2 per rad) times the residual.
     """
-    wanted = np.array(goal, dtype=np.float64)
+    wanted = real_array("goal", goal)
     if wanted.shape == (3, 3):
         return _rotation(marker, wanted, tolerance, weight)
     there = unit_vector("goal", wanted)
@@ -141,6 +148,7 @@ def hold(first: str, second: str, distance: float, tolerance: float = METRES, we
     The residual is the absolute error of the distance [m]. A residual of at most `tolerance` (5 mm) meets the term; the cost is `weight`
     (20 per m) times the residual. `first`, `second`: names of the markers.
     """
+    finite("distance", distance)
 
     def residual(pose: Pose) -> Array:
         found: Array = np.abs(lengths(pose.position(first) - pose.position(second)) - distance)
@@ -221,10 +229,14 @@ def home(posture: ArrayLike | None = None, weight: float = 0.05) -> Term:
     The residual is the Euclidean distance, where each motor is divided by its range. The term is only minimised; it has no tolerance. The
     cost is `weight` times the residual.
     """
-    given = None if posture is None else np.array(posture, dtype=np.float64)
+    given = None if posture is None else real_array("posture", posture)
+    if given is not None and (given.ndim != 1 or not np.isfinite(given).all()):
+        raise InvalidValue(f"posture has shape {given.shape}; it must be (n,) rad, finite, a position for every motor.")
 
     def residual(pose: Pose) -> Array:
         limits = pose.robot.limits
+        if given is not None and len(given) != len(limits):
+            raise InvalidValue(f"posture has {len(given)} numbers; it must be ({len(limits)},) rad, a position for every motor.")
         return lengths((pose.q - (pose.robot.home if given is None else given)) / (limits[:, 1] - limits[:, 0]))
 
     return checked_term("home", residual, weight, None)
@@ -251,9 +263,9 @@ def balance(place: ArrayLike | None = None, tolerance: float | None = None, weig
     `place`: (2,) m, x and y in the root frame; None: the place above which the centre of mass is at the home pose. A residual of at most
     `tolerance` [m] meets the term; None: it is only minimised. The cost is `weight` (20 per m) times the residual.
     """
-    above = None if place is None else np.array(place, dtype=np.float64)
-    if above is not None and above.shape != (2,):
-        raise InvalidValue(f"place has shape {above.shape}; it must be (2,) m, x and y in the root frame.")
+    above = None if place is None else real_array("place", place)
+    if above is not None and (above.shape != (2,) or not np.isfinite(above).all()):
+        raise InvalidValue(f"place has shape {above.shape}; it must be (2,) m, finite, x and y in the root frame.")
 
     def residual(pose: Pose) -> Array:
         wanted = centre_of_mass_at_home(pose.robot)[:2] if above is None else above
@@ -286,7 +298,7 @@ def term(
     Args:
         function: takes a batch of N poses (`pose.q` (N, n), `pose.position(marker)` (N, 3), ...) and the table of all their contacts, and
             returns N numbers.  A function for one pose (`pose.position(marker)` (3,), contacts a tuple of Contact) that returns one number
-            is also accepted; it is called for each pose, which takes longer.
+            is also accepted; it is called for each pose, which takes longer.  inf: the pose is not valid; NaN raises InvalidValue.
         tolerance: largest value at which the term counts as met; None: the term is only minimised.
         weight: factor on the value. None: 0.1 / tolerance, so that the cost is 1 at ten times the tolerance; or 1 if the tolerance is None
             or 0.
@@ -296,7 +308,15 @@ def term(
         raise InvalidValue(f"{function!r} is no cost: it must be a function of pose and contacts, or of mobee.costs.")
     if weight is None:
         weight = 0.1 / tolerance if tolerance else 1.0
-    return checked_term(name or getattr(function, "__name__", "term"), Function(function), weight, tolerance)
+    called, values = name or getattr(function, "__name__", "term"), Function(function)
+
+    def residual(pose: Pose) -> Array:
+        found = values(pose)
+        if np.isnan(found).any():  # no comparison with the tolerance is true, so a pose could seem to meet the term
+            raise InvalidValue(f"cost {called!r} is nan in a pose; it must be a number in all poses, inf where a pose is not valid.")
+        return found
+
+    return checked_term(called, residual, weight, tolerance)
 
 
 def _rotation(marker: str, wanted: Array, tolerance: float, weight: float) -> Term:
@@ -397,6 +417,7 @@ def plane(marker: str, normal: ArrayLike, offset: float, tolerance: float = METR
     residual.
     """
     across = unit_vector("normal", normal)
+    finite("offset", offset)
 
     def residual(pose: Pose) -> Array:
         found: Array = np.abs(pose.position(marker) @ across - offset)
@@ -415,6 +436,7 @@ def at_most(marker: str, direction: ArrayLike, most: float, tolerance: float = M
     limits the height. A residual of at most `tolerance` (5 mm) meets the term; the cost is `weight` (20 per m) times the residual.
     """
     along = unit_vector("direction", direction)
+    finite("most", most)
 
     def residual(pose: Pose) -> Array:
         found: Array = np.maximum(pose.position(marker) @ along - most, 0.0)

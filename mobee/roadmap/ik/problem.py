@@ -72,7 +72,8 @@ def needed(problem: Problem, aims: Iterable[Aim]) -> Flags:
     pose = problem.model.evaluate(problem.whole(drawn.reshape(-1, len(low))))
     for one in others:
         said = one.residual(pose).reshape(PROBES, -1)
-        moves[still[(np.abs(said[:, 1:] - said[:, :1]) > _MIN_EFFECT).sum(axis=0) > 0]] = True
+        with np.errstate(invalid="ignore"):  # infinite in both poses
+            moves[still[(np.abs(said[:, 1:] - said[:, :1]) > _MIN_EFFECT).sum(axis=0) > 0]] = True
     return moves
 
 

@@ -79,6 +79,11 @@ def test_terms_without_a_derivative_are_checked_afterwards(arm: mobee.Model) -> 
     assert len(y) > 20 and (y[:, 0] <= 0.0).all()
 
 
+def test_a_term_that_is_nan_in_some_poses_is_an_error(arm: mobee.Model) -> None:
+    with pytest.raises(InvalidValue, match="'mine' is nan"):
+        built(arm, TIP, terms=[costs.term(lambda pose, contacts: np.where(pose.position("tip")[..., 0] > 0.0, np.nan, 0.0), name="mine")])
+
+
 def test_motors_and_one_dimension(arm: mobee.Model) -> None:
     _, q, y = built(arm, tasks.motors({"m1": (-1.0, 1.0)}), np.array([0.25]), terms=[costs.plane("tip", (0, 1, 0), 0.2)])
     np.testing.assert_allclose(np.sort(y[:, 0]), np.linspace(-1.0, 1.0, 9), atol=0.02 * 0.25)

@@ -137,12 +137,25 @@ def test_every_term_has_the_same_values_for_a_batch_and_for_each_pose(free: mobe
         lambda: costs.orientation("left_palm", 2.0 * np.eye(3)),
         lambda: costs.collision("deepest"),
         lambda: costs.balance([1.0]),
+        lambda: costs.balance([1.0, np.nan]),
+        lambda: costs.home(0.1),
+        lambda: costs.home([np.nan] * 41),
+        lambda: costs.home("home"),
+        lambda: costs.hold("left_palm", "right_palm", np.nan),
+        lambda: costs.plane("left_palm", [0.0, 0.0, 1.0], np.inf),
+        lambda: costs.at_most("left_palm", [0.0, 0.0, 1.0], np.nan),
+        lambda: costs.orientation("left_palm", "down"),
         lambda: costs.term(3.0),
     ],
 )
 def test_invalid_arguments_are_refused(make) -> None:
     with pytest.raises(InvalidValue):
         make()
+
+
+def test_a_posture_of_another_robot_is_refused(free: mobee.Model, icub: mobee.Robot) -> None:
+    with pytest.raises(InvalidValue, match=r"posture has 7 numbers; it must be \(41,\)"):
+        costs.home([0.1] * 7).residual(free.evaluate(icub.home[None]))
 
 
 def test_an_unknown_marker_is_refused(free: mobee.Model, icub: mobee.Robot) -> None:

@@ -66,6 +66,13 @@ def test_a_function_that_returns_no_number_is_refused(free: mobee.Model, icub: m
         costs.term(lambda pose, contacts: pose.position("left_palm") - PLACE).residual(free.evaluate(icub.home[None]))
 
 
+def test_a_function_that_is_nan_in_a_pose_is_refused_by_name(free: mobee.Model, postures: np.ndarray) -> None:
+    heights = free.evaluate(postures).position("left_palm")[:, 2]
+    one = costs.term(lambda pose, contacts: np.where(pose.position("left_palm")[..., 2] > np.median(heights), np.nan, 0.0), name="mine")
+    with pytest.raises(InvalidValue, match="'mine' is nan in a pose.*inf"):
+        one.residual(free.evaluate(postures))
+
+
 def test_weight_is_one_at_ten_tolerances() -> None:
     assert costs.term(len, tolerance=0.05).weight * 0.5 == pytest.approx(1.0)
     assert costs.term(len, tolerance=None).weight == 1.0
