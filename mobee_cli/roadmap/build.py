@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -46,8 +47,8 @@ def run(arguments: argparse.Namespace) -> int:
     from mobee_cli.roadmap.map_file import as_json, summary
     from mobee_cli.roadmap.tasks import task_named
 
-    if not arguments.longest >= 0.0:
-        raise UserError(f"--longest {arguments.longest:g}: must be above 0, or 0 for no limit", BAD_INPUT)
+    if not 0.0 <= arguments.longest < math.inf:
+        raise UserError(f"--longest {arguments.longest:g}: must be finite and above 0, or 0 for no limit", BAD_INPUT)
     example = task_named(arguments.task, given_options(arguments), lambda: Model(robot_given(arguments), world_given(arguments)))
     path: Path = arguments.output or Path(f"{Path(arguments.task).stem}.npz")
     if not path.resolve().parent.is_dir():

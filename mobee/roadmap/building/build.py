@@ -22,7 +22,7 @@ from mobee.model.model import Model
 from mobee.roadmap.building.checkpoint import Checkpoint, Progress, request
 from mobee.roadmap.building.frontier_builder import FrontierBuilder, PoseEvaluator
 from mobee.roadmap.building.lattice_builder import LatticeBuilder
-from mobee.roadmap.building.search_scheduler import SearchSettings
+from mobee.roadmap.building.search_scheduler import SearchSettings, check_setting
 from mobee.roadmap.building.tasks import Task
 from mobee.roadmap.ik.costs import collision
 from mobee.roadmap.ik.problem import Cost, Problem
@@ -62,10 +62,12 @@ class RoadmapSettings:
     def __post_init__(self) -> None:
         if self.method not in METHODS:
             raise UnknownName("method", self.method, METHODS)
-        if self.neighbours is not None and self.neighbours < 1:
-            raise InvalidValue(f"neighbours {self.neighbours!r}: must be at least 1, or None for the dimension of the task space.")
-        if self.longest is not None and not self.longest > 0.0:
-            raise InvalidValue(f"longest {self.longest!r} rad: must be above 0, or None for no limit.")
+        if self.neighbours is not None:
+            valid = "a whole number of at least 1, or None for the dimension of the task space"
+            check_setting(self, "neighbours", lambda x: x >= 1, valid, whole=True)
+        if self.longest is not None:
+            check_setting(self, "longest", lambda x: x > 0.0, "a finite number above 0 [rad], or None for no limit")
+        check_setting(self, "margin", lambda x: x >= 0.0, "a finite number of at least 0 [rad]")
 
 
 _DEFAULT = RoadmapSettings()
@@ -105,7 +107,7 @@ def build_roadmap(
         InvalidValue, UnknownName: an argument is not valid; the message states the valid values.
         MobeeError: no first pose was found, the file has other settings or cannot be written, or the world has changed.
     """
-    checked_seed(seed)
+    seed = checked_seed(seed)
     problem = Problem(model, _with_contacts(costs), start, motors, settings.margin)
     distances = _checked_spacing(task, spacing)
     # The names in a file: "front" is what SearchSettings was called in the first version of the format.

@@ -6,8 +6,9 @@ A search has a start, an aim and a time limit.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
@@ -72,16 +73,26 @@ class SearchSettings:
     searches: int = 32
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.delta <= 1.0:
-            raise InvalidValue(f"delta {self.delta!r}: must be above 0 and at most 1.")
+        check_setting(self, "delta", lambda x: 0.0 < x <= 1.0, "a number above 0 and at most 1")
         for name in ("std", "wide_std"):
-            if not 0.0 < getattr(self, name) <= 1.0:
-                raise InvalidValue(f"{name} {getattr(self, name)!r}: must be above 0 and at most 1, in ranges of the motors.")
-        if self.population is not None and self.population < 4:
-            raise InvalidValue(f"population {self.population!r}: must be at least 4, or None.")
-        for name in ("patience", "tries", "searches"):
-            if getattr(self, name) < 1:
-                raise InvalidValue(f"{name} {getattr(self, name)!r}: must be at least 1.")
+            check_setting(self, name, lambda x: 0.0 < x <= 1.0, "a number above 0 and at most 1, in ranges of the motors")
+        check_setting(self, "patience", lambda x: x >= 1, "a finite number of at least 1")
+        if self.population is not None:
+            check_setting(self, "population", lambda x: x >= 4, "a whole number of at least 4, or None", whole=True)
+        for name in ("tries", "searches"):
+            check_setting(self, name, lambda x: x >= 1, "a whole number of at least 1", whole=True)
+
+
+def check_setting(settings: object, name: str, fits: Callable[[Any], bool], valid: str, whole: bool = False) -> None:
+    """Raise InvalidValue unless a field of a frozen dataclass is a finite number, or a whole one, that `fits`; `valid`: what is valid.
+
+    A number of NumPy is replaced by a plain one, because the settings are written as JSON.
+    """
+    given = getattr(settings, name)
+    if isinstance(given, bool) or not isinstance(given, Integral if whole else Real) or not (np.isfinite(given) and fits(given)):
+        raise InvalidValue(f"{name} {given!r}: must be {valid}.")
+    if not isinstance(given, int | float):
+        object.__setattr__(settings, name, (int if whole else float)(getattr(settings, name)))
 
 
 class SearchScheduler:

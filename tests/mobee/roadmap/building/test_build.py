@@ -185,6 +185,15 @@ def test_settings_are_plain_json(whole: mobee.Roadmap) -> None:
     assert settings["versions"].keys() == {"mobee", "numpy"}
 
 
+def test_numbers_of_numpy_are_settings(model: mobee.Model, tmp_path: Path) -> None:
+    search = dataclasses.replace(QUICK, patience=np.float32(3.0), searches=np.int32(4))
+    numbers = {"seed": np.int64(0), "neighbours": np.int64(4), "longest": np.float32(0.5), "search": search}
+    found = _build(model, file=tmp_path / "map.npz", **numbers)
+    same = _build(model, neighbours=4, longest=0.5, search=dataclasses.replace(QUICK, patience=3.0, searches=4))
+    np.testing.assert_array_equal(mobee.load_roadmap(tmp_path / "map.npz").edges, same.edges)
+    assert json.dumps(found.settings["front"]) == json.dumps(same.settings["front"])
+
+
 def test_neighbours_and_longest_choose_the_edges(model: mobee.Model, whole: mobee.Roadmap) -> None:
     every = _build(model, longest=None)
     assert len(every.edges) == 2 * len(every.q) - 3
@@ -213,7 +222,11 @@ def test_plain_functions_are_costs_and_coordinates(model: mobee.Model) -> None:
         ({"spacing": [0.1, 0.1, 0.1]}, "one number, or 2"),
         ({"method": "ness"}, "Did you mean 'nes'"),
         ({"neighbours": 0}, "at least 1"),
+        ({"neighbours": 2.5}, "whole number"),
+        ({"neighbours": True}, "whole number"),
         ({"longest": 0.0}, "above 0"),
+        ({"longest": float("inf")}, "finite number above 0.*None for no limit"),
+        ({"longest": "0.4"}, "finite number above 0"),
         ({"costs": COSTS[0]}, "list of terms"),
         ({"motors": ["right_harm"]}, "right_arm"),
         ({"start": [0.0]}, "a position for every motor"),
@@ -233,7 +246,21 @@ def test_a_task_out_of_reach_is_an_error(model: mobee.Model, monkeypatch: pytest
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"delta": 0.0}, {"delta": 1.5}, {"std": 0.0}, {"wide_std": 2.0}, {"population": 3}, {"patience": 0}, {"tries": 0}]
+    "wrong",
+    [
+        {"delta": 0.0},
+        {"delta": 1.5},
+        {"std": 0.0},
+        {"wide_std": 2.0},
+        {"population": 3},
+        {"population": 8.5},
+        {"patience": 0},
+        {"patience": float("inf")},
+        {"patience": float("nan")},
+        {"tries": 0},
+        {"searches": 2.5},
+        {"searches": "4"},
+    ],
 )
 def test_search_settings_out_of_range_are_refused(wrong: dict[str, Any]) -> None:
     with pytest.raises(mobee.InvalidValue, match=next(iter(wrong))):
