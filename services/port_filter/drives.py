@@ -42,13 +42,23 @@ class DriveServer:
     ownership) that robot_sim has given to the port filter. `epochs`: dict from a part to the newest of these epochs; 0: none yet.
     """
 
-    def __init__(self, service: Service, twin: Service, robot: Robot, refusal: Callable[[], str], on_arm: Callable[[], None]) -> None:
+    def __init__(
+        self,
+        service: Service,
+        twin: Service,
+        robot: Robot,
+        refusal: Callable[[], str],
+        is_moved_back: Callable[[str], bool],
+        on_arm: Callable[[], None],
+    ) -> None:
         """Begin to answer the calls of the clients.
 
         `service`: client of the robot. `twin`: acts as the robot in the namespace of the clients. `refusal`: returns the reason why no
-        client may drive now; empty: clients may drive. `on_arm`: called when a client has armed a part.
+        client may drive now; empty: clients may drive. `is_moved_back`: returns whether the reflex moves a part now, so that the filter
+        must keep its drive. `on_arm`: called when a client has armed a part.
         """
         self._service, self._twin, self._refusal, self._on_arm = service, twin, refusal, on_arm
+        self._is_moved_back = is_moved_back
         self._owners: dict[str, Owner | None] = dict.fromkeys(robot.parts)
         self.epochs: dict[str, int] = dict.fromkeys(robot.parts, 0)
         twin.on_request(keys.drive("*", "take"), Take, self._take, part_of_key=True)
@@ -101,7 +111,7 @@ class DriveServer:
                 raise CallRefused("no_token", f"{part}: no liveliness token alive/{owner.who}/{owner.instance}: declare it, then arm")
         if verb == "release":
             self._owners[part] = None
-        if self._refusal():
+        if self._is_moved_back(part) or (self._refusal() and verb != "release"):
             return Driven(v=request.v, gate="hold")  # as the clients see it; the reflex keeps the drive
         with _forwarded():
             driven = self._call(part, verb)
@@ -118,7 +128,7 @@ class DriveServer:
             if not up and owner == Owner(who, instance):
                 self._service.bus.event("warning", "client_gone", f"{who} is gone: {part} holds")
                 self._owners[part] = None
-                if not self._refusal():
+                if not self._is_moved_back(part):
                     self.hold(part)
 
 

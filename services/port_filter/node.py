@@ -72,7 +72,7 @@ class FilterNode:
         self._driven: list[str] = []  # parts that the reflex moves
         self._last_k = -1
         self._complete = self._is_waiting = False  # lockstep: every client that takes part has come; some have not answered yet
-        self._drives = DriveServer(service, twin, robot, self._refusal, self._mark)
+        self._drives = DriveServer(service, twin, robot, self._refusal, lambda part: part in self._driven, self._mark)
         self._streams = Streams(service, twin, robot, self._drives.epochs, self._refusal, self._mark)
         Forwarder(service, twin, robot)
         self._clock = twin.bus.publisher(Clock)

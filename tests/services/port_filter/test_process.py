@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The port filter as a process, between a client's own program and robot_sim as a process."""
+"""The port filter as a process, between a client's own program and robot_sim as a process, in lockstep: no load changes a motion."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import pytest
 from zenoh.handlers import FifoChannel, RingChannel
 
 from bus_schema import keys
-from bus_schema.messages import Clock, Command, EStop, Event, State
+from bus_schema.messages import Clock, Command, EStop, Event, State, StepDone
 from bus_schema.rpc import Done, Driven, Empty, PartMeta, Request, Take, Taken, WithEpoch
 from mobee.arrays import Array
 from mobee.robot.load import load_robot
@@ -28,21 +28,22 @@ TORSO = ROBOT.part("torso")
 YAW, PITCH = TORSO.motors.index("torso_yaw"), TORSO.motors.index("torso_pitch")
 FAST = float(np.deg2rad(25.0))  # rad/s
 NEAR = np.deg2rad(1.5)  # rad: backlash, noise of the encoders and of the recorded poses
-TRIES = 5  # on a busy machine commands may come too late, and the gate holds
+LOCKSTEP = ("--mode", "lock", "--patience", "20")
 ROBOT_ITSELF, FILTERED = "icub", "icub_filtered"
 
 
 class Client:
-    """A program that drives the torso; it knows a robot by its namespace alone."""
+    """A program that drives the torso; it knows a robot by its namespace alone. Every tick waits until it asks for the next one."""
 
     def __init__(self, endpoint: str, namespace: str, name: str = "client") -> None:
         self.session = open_client(endpoint, namespace=namespace)
         self.bus, self.name = Bus(self.session, name, logging.getLogger(name)), name
-        self.bus.part_sizes = {"torso": len(TORSO)}
+        self.bus.part_sizes, self.bus.control = {"torso": len(TORSO)}, "STEP"
         self.token = self.session.liveliness().declare_token(keys.alive(name, "c1"))
         self.clock = self.session.declare_subscriber(Clock.stream.key(), RingChannel(1))
         self.states = self.bus.latest(State, "torso")
         self.commands = self.bus.publisher(Command, "torso")
+        self.answers, self.answered = self.bus.publisher(StepDone, name), -1
         self.events: list[Event] = []
         self.state: State | None = None
         self.epoch = self.sent = 0
@@ -54,7 +55,10 @@ class Client:
         self.session.close()
 
     def tick(self) -> bool:
-        """Whether a tick has come since the last call."""
+        """Whether a tick has come since the last call; what was sent before the call answers the one before."""
+        if self.answered < self.bus.k:
+            self.answered = self.bus.k
+            self.done()
         sample = self.clock.try_recv()
         clock = None if sample is None else self.bus.receive(Clock, sample, any_run=True)
         if clock is None:
@@ -64,6 +68,10 @@ class Client:
         while (sample := self.told_of.try_recv()) is not None:
             self.events += filter(None, [self.bus.receive(Event, sample, any_run=True)])
         return True
+
+    def done(self, last: bool = False) -> None:
+        """Answer the newest tick; after the `last` answer no tick waits for this program."""
+        self.answers.put(re_k=self.bus.k, ok=True, busy=[], last=last, including=[])
 
     @property
     def q(self) -> Array:
@@ -82,12 +90,12 @@ class Client:
         return rpc.call(self.session, self.name, key, request, reply, timeout=10.0, **fields)
 
     def arm(self) -> None:
-        wait_for(self._took, "the drive")
+        self.until(self._took, "the drive")
         assert self.call(keys.drive("torso", "arm"), WithEpoch, Driven, epoch=self.epoch).gate == "armed"
         self.until(lambda: self.gate == "armed", "the armed state")
 
     def _took(self) -> bool:
-        """Whether the drive was given; not while the reflex takes the robot back, which a busy machine may have called."""
+        """Whether the drive was given; not while the reflex takes the robot back."""
         try:
             self.epoch = self.call(keys.drive("torso", "take"), Take, Taken, instance="c1").epoch
         except CallFailed as failed:
@@ -96,27 +104,12 @@ class Client:
             return False
         return True
 
-    def answer(self) -> None:
-        """Answer for the pose as it is; not while the reflex takes the robot back."""
-        wait_for(self._answered, "the waypoint")
-
-    def _answered(self) -> bool:
-        try:
-            self.call(keys.waypoint("torso"), Empty, Done)
-        except CallFailed as failed:
-            if "while the reflex is in control" not in str(failed):
-                raise
-            return False
-        return True
+    def accept(self) -> None:
+        """Answer for the pose as it is."""
+        self.call(keys.waypoint("torso"), Empty, Done)
 
     def until(self, condition: Callable[[], bool], what: str, timeout: float = 10.0) -> None:
         wait_for(lambda: self.tick() and condition(), what, timeout)
-
-    def happens(self, condition: Callable[[], bool], timeout: float) -> bool:
-        """Whether a condition becomes true within `timeout` seconds of the robot's time."""
-        end = self.bus.t + timeout * 1e9
-        self.until(lambda: condition() or self.bus.t > end, "the robot's time", 10.0 * timeout)
-        return condition()
 
     def go(self, motor: int, degrees: float) -> None:
         """A position move, then a short rest; ends early when the gate does not obey any more."""
@@ -150,8 +143,8 @@ class Client:
 @pytest.fixture(scope="module")
 def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
     with rig(tmp_path_factory.mktemp("filter"), ROBOT) as made:
-        made.start("services.robot_sim", "robot_sim", "--backend", "kinematic", "--seed", "7")
-        program = made.start("services.port_filter", "port_filter")
+        made.start("services.robot_sim", "robot_sim", "--backend", "kinematic", "--seed", "7", "--participants", "port_filter", *LOCKSTEP)
+        program = made.start("services.port_filter", "port_filter", *LOCKSTEP)
         yield made
         assert program.stop(signal.SIGTERM) == 0
 
@@ -193,23 +186,15 @@ def test_one_program_drives_the_robot_and_its_filtered_twin(client: Callable[[st
 
 
 def undo(mine: Client, motion: Callable[[], Array], during: Callable[[], None] = lambda: None) -> None:
-    """Repeat a motion into the table until the reflex undoes it, back to the pose that `motion` returns.
-
-    On a busy machine commands may come too late: then the gate holds first, or the robot comes too deep into the table.
-    """
-    for _ in range(TRIES):
-        mine.answer()
-        mine.arm()
-        mine.events.clear()
-        begun = motion()
-        mine.until(lambda: mine.gate == "hold", "the end of the motion")
-        if not mine.happens(mine.has_event("reflex"), 1.0):
-            continue
-        during()
-        is_back = partial(mine.is_near, begun)
-        if mine.happens(mine.has_event("motion_failed"), 10.0) and mine.happens(is_back, 2.0):
-            return
-    raise AssertionError(f"the reflex undid none of {TRIES} motions: {mine.events}")
+    """Make a motion into the table, which the reflex undoes, back to the pose that `motion` returns."""
+    mine.accept()
+    mine.arm()
+    begun = motion()
+    mine.until(lambda: mine.gate == "hold", "the end of the motion")
+    during()
+    mine.until(mine.has_event("motion_failed"), "the end of the reflex")
+    mine.until(partial(mine.is_near, begun), "the pose in which the motion began")
+    assert mine.has_event("reflex")()
 
 
 def test_a_motion_into_the_table_is_undone_and_reported_to_its_client(client: Callable[[str], Client]) -> None:
@@ -241,7 +226,7 @@ def test_in_another_modality_the_reflex_goes_back_to_a_waypoint_set_by_a_call(cl
         mine.drive(YAW, FAST, lambda: bool(mine.q[YAW] > np.deg2rad(5.0)))
         mine.drive(YAW, 0.0, lambda: mine.bus.k % 30 == 0)
         here = mine.q
-        mine.answer()
+        mine.accept()
         mine.drive(PITCH, FAST, lambda: False)
         return here
 
@@ -253,17 +238,33 @@ def test_a_robot_that_starts_in_contact_moves_when_a_client_accepts_the_pose(cli
     direct.arm()
     direct.go(PITCH, 10.0)
     direct.call(keys.drive("torso", "release"), WithEpoch, Driven, epoch=direct.epoch)
+    direct.done(last=True)
     mine = client(FILTERED)
     with pytest.raises(CallFailed, match="table .* no motion back.* rpc/waypoint"):
         mine.arm()
-    for _ in range(TRIES):
-        mine.answer()
-        mine.arm()
-        mine.go(PITCH, 0.0)
-        if mine.gate == "armed":
-            break
+    mine.accept()
+    mine.arm()
+    mine.go(PITCH, 0.0)
     assert mine.gate == "armed"
     assert abs(mine.q[PITCH]) < NEAR
+
+
+def test_a_part_that_is_released_while_the_reflex_is_stuck_is_free_for_others(client: Callable[[str], Client]) -> None:
+    """The filter has not moved this part back, and needs its drive no longer."""
+    mine = client(FILTERED)
+    epoch = mine.call(keys.drive("head", "take"), Take, Taken, instance="c1").epoch
+    mine.done(last=True)
+    direct = client(ROBOT_ITSELF)
+    direct.arm()
+    direct.go(PITCH, 10.0)
+    with pytest.raises(CallFailed, match="table .* no motion back"):
+        mine.call(keys.drive("head", "take"), Take, Taken, instance="c1")
+    assert mine.call(keys.drive("head", "release"), WithEpoch, Driven, epoch=epoch).gate == "idle"
+    assert direct.call(keys.drive("head", "take"), Take, Taken, instance="c1").epoch > epoch
+    direct.go(PITCH, 0.0)
+    direct.call(keys.drive("torso", "release"), WithEpoch, Driven, epoch=direct.epoch)
+    direct.done(last=True)
+    mine.accept()
 
 
 def test_the_robot_is_released_when_the_client_ends(robot: Rig, client: Callable[[str], Client]) -> None:
