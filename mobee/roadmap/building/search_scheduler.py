@@ -89,7 +89,7 @@ def check_setting(settings: object, name: str, fits: Callable[[Any], bool], vali
     A number of NumPy is replaced by a plain one, because the settings are written as JSON.
     """
     given = getattr(settings, name)
-    if isinstance(given, bool) or not isinstance(given, Integral if whole else Real) or not (np.isfinite(given) and fits(given)):
+    if isinstance(given, bool) or not isinstance(given, Integral if whole else Real) or not (np.isfinite(float(given)) and fits(given)):
         raise InvalidValue(f"{name} {given!r}: must be {valid}.")
     if not isinstance(given, int | float):
         object.__setattr__(settings, name, (int if whole else float)(getattr(settings, name)))
