@@ -83,6 +83,7 @@ class ReachAgent(ReachLearner):
         super().__init__(space, reaches, chosen, beliefs, model)
         self.plant, self.marker, self.store = plant, marker, store
         self._state: int | None = None
+        self._is_behind = False  # a write was begun, and what it wrote was not learned
         if store is not None:
             store.bind({"space": space.settings, "marker": marker, "scale": scale})
             store.learner(self.settings)
@@ -106,6 +107,7 @@ class ReachAgent(ReachLearner):
         ActionInterrupted if the plant does; the problem-try then stays under way, and the next call for a target at the same position
         continues it.
         """
+        self._catch_up()
         self.begin(target)
         self.plant.present(target)
         while self.under_way is not None:
@@ -119,6 +121,7 @@ class ReachAgent(ReachLearner):
         A problem is one target. If several problems have the fewest tries, a random one of them is chosen. A problem-try under way is
         continued first. If an action is interrupted, the agent chooses the next action of the same problem-try.
         """
+        self._catch_up()
         end = self.tries + tries
         while self.tries < end:
             target = self.problems.targets[self.under_way] if self.under_way is not None else None
@@ -177,17 +180,29 @@ class ReachAgent(ReachLearner):
         """Perform one action of the present problem-try (attempt to reach one target), learn from it, and return it.
 
         Before, `begin` must start the problem-try, and the plant's method `present` must be called with its target, as `try_problem` does.
-        Raises ActionInterrupted if the plant interrupts the action, and InvalidValue if no problem-try is under way.
+        With a store the step is on disk when this returns. After an interrupt (Ctrl-C) during the write, the next call learns the step
+        first if it is on disk. Raises ActionInterrupted if the plant interrupts the action, and InvalidValue if no problem-try is under
+        way.
         """
+        self._catch_up()
         state = self.state
         action = self.decide(state)
         self._state = None  # unknown if the action is interrupted, or its record fails
         step = self._reached(state) if action == REACH else self._moved(state, action)
         if self.store is not None:
+            self._is_behind = True
             self.store.append(step, self.problems.targets)
         self.observe(step)
+        self._is_behind = False
         self._state = step.s_next
         return step
+
+    def _catch_up(self) -> None:
+        """Learn the steps that are on disk and were not learned, because their write was interrupted."""
+        if self._is_behind and self.store is not None:
+            for step in self.store.after(self.steps):
+                self.observe(step)
+        self._is_behind = False
 
     def _moved(self, state: int, action: int) -> Step:
         """Make a transition; a failure costs the penalty."""

@@ -177,6 +177,11 @@ class ReachStore(AgentFile):
                 with transaction(self._db):
                     for statement in TABLES.split(";")[:-1]:
                         self._db.execute(statement)
+        self._count()
+
+    def _count(self) -> None:
+        """Read how many steps and problems are on disk."""
+        with explained(self.path):
             self._last, self._problems = (
                 int(self._db.execute(f"SELECT count(*) FROM {table} WHERE agent = ?", (self.agent,)).fetchone()[0])
                 for table in ("reach_steps", "reach_problems")
@@ -211,6 +216,11 @@ class ReachStore(AgentFile):
             self._db.executemany("INSERT INTO reach_problems VALUES (?, ?, ?)", new)
             self._db.execute(f"INSERT INTO reach_steps VALUES ({', '.join('?' * len(values))})", values)
         self._last, self._problems = step.n, self._problems + len(new)
+
+    def after(self, n: int) -> list[Step]:
+        """Read again which steps are on disk, because a call of `append` was interrupted; return those after the first `n`."""
+        self._count()
+        return self.load()[n:]
 
     def times(self) -> list[float]:
         """Return the time at which each step (action of the learner) was written, in order, in s since 1970."""

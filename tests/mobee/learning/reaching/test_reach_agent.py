@@ -227,6 +227,9 @@ def test_a_step_that_cannot_be_kept_is_none_and_where_the_part_is_is_measured_an
             if self.full:
                 raise MobeeError("the disk is full")
 
+        def after(self, n):
+            return []
+
     reacher = corridor()
     reacher._strategy = Fixed([0.0, 0.0, 0.0, 1.0])
     reacher.store = Full()
@@ -235,6 +238,30 @@ def test_a_step_that_cannot_be_kept_is_none_and_where_the_part_is_is_measured_an
     assert (reacher.steps, reacher.plant.state, reacher.state) == (0, 1, 1)
     reacher.store.full = False
     assert [state for state, _, _, _ in reacher.try_problem(GOAL).path] == [1, 2]
+
+
+@pytest.mark.parametrize("counted", [True, False])
+def test_an_interrupted_write_is_learnt_if_it_is_on_disk(tmp_path, counted, monkeypatch):
+    with ReachStore(tmp_path / "steps.sqlite", "left_arm") as store:
+        reacher, whole = corridor(store=store), corridor()
+        append, written = store.append, []
+
+        def interrupted(step, targets):
+            append(step, targets)
+            if not counted:
+                store._last, store._problems = store._last - 1, 0  # as if the interrupt had come within the call
+            written.append(step)
+            raise KeyboardInterrupt
+
+        for _ in range(4):
+            monkeypatch.setattr(store, "append", interrupted)
+            with pytest.raises(KeyboardInterrupt):
+                reacher.learn([GOAL], 1)
+            monkeypatch.undo()
+        reacher.learn([GOAL], 3)
+        whole.learn([GOAL], reacher.tries)
+        assert len(written) == 4 and store.load()[0] == written[0]
+        assert len(store.load()) == reacher.steps == whole.steps and reacher.last == whole.last
 
 
 def test_a_try_left_for_another_problem_has_ended():
