@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mobee.arrays import Array
+from mobee.arrays import Array, real_array
 from mobee.errors import InvalidValue, UnknownName
 from mobee.robot.bodies import one_a_link
 from mobee.robot.pairs import joined_pairs, joined_untested
@@ -57,7 +57,7 @@ def join_robots(
     for key in places or {}:
         if key not in robots:
             raise UnknownName("robot", key, robots)
-    stand = {key: (np.zeros(3), np.eye(3)) for key in robots} | {key: _pose(key, *place) for key, place in (places or {}).items()}
+    stand = {key: (np.zeros(3), np.eye(3)) for key in robots} | {key: _pose(key, place) for key, place in (places or {}).items()}
     placed = [Placed(key, robot, *stand[key]) for key, robot in robots.items()]
     return join_placed(placed, name or SEPARATOR.join(key or robot.name for key, robot in robots.items()))
 
@@ -188,8 +188,10 @@ def _check_names(bodies: Sequence[Robot]) -> None:
             raise InvalidValue(f"two {kind} of the joined robots have the name {twice[0]!r}. Give each robot its own name")
 
 
-def _pose(key: str, position: ArrayLike, rotation: ArrayLike) -> tuple[Array, Array]:
-    at, turn = np.asarray(position, dtype=float), np.asarray(rotation, dtype=float)
+def _pose(key: str, place: tuple[ArrayLike, ArrayLike]) -> tuple[Array, Array]:
+    if not isinstance(place, tuple | list) or len(place) != 2:
+        raise InvalidValue(f"place of robot {key!r} is no pair. Give (position, rotation): 3 numbers in metres, and a matrix (3, 3).")
+    at, turn = (real_array(f"place of robot {key!r}: {what}", given) for what, given in zip(("position", "rotation"), place, strict=True))
     if at.shape != (3,) or not np.isfinite(at).all():
         raise InvalidValue(f"place of robot {key!r}: position has shape {at.shape}; give 3 finite numbers in metres.")
     if turn.shape != (3, 3) or not np.abs(turn @ turn.T - np.eye(3)).max() < 1e-6 or np.linalg.det(turn) < 0:

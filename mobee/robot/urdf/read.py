@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from numbers import Integral, Real
 from pathlib import Path
 
 import numpy as np
@@ -61,14 +62,21 @@ def read_urdf(path: Path, options: UrdfOptions | None = None) -> Robot:
 
 
 def check_options(options: UrdfOptions) -> None:
-    """Raise InvalidValue if `field`, `meshes` or `corners` of the options is out of range."""
-    if options.field is not None and not 0 < options.field <= 1:
+    """Raise InvalidValue if an option is of a wrong type or out of range."""
+    if options.field is not None and not (_is(options.field, Real) and 0 < options.field <= 1):
         raise InvalidValue(f"field={options.field!r} is no distance for a field. Give metres, such as field=0.03.")
     if options.meshes not in ("hull", "bounding"):
         raise InvalidValue(f'meshes={options.meshes!r} is unknown. Valid: "hull", "bounding".')
-    whole = isinstance(options.corners, int) and not isinstance(options.corners, bool)
-    if options.corners != "all" and not (whole and options.corners >= FEWEST):
+    if options.corners != "all" and not (_is(options.corners, Integral) and options.corners >= FEWEST):
         raise InvalidValue(f'corners={options.corners!r} is no number of corners. Give a whole number from {FEWEST} on, or "all".')
+    if not isinstance(options.srdf, str | Path | None):
+        raise InvalidValue(f"srdf={options.srdf!r} is no path of an SRDF. Give a path, or leave it out.")
+    if not isinstance(options.home, str | None):
+        raise InvalidValue(f"home={options.home!r} is no name of a pose. Give a name of the file as text, or leave it out.")
+
+
+def _is(value: object, kind: type) -> bool:
+    return isinstance(value, kind) and not isinstance(value, bool)
 
 
 def _read_srdf(path: Path, name: str, options: UrdfOptions, tree: Tree) -> Srdf:

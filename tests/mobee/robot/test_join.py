@@ -104,6 +104,11 @@ def test_a_place_without_a_robot_or_without_a_pose_is_refused() -> None:
         join_robots({"katana": KATANA}, {"katana": (AT, -TURN)})
     with pytest.raises(InvalidValue, match="place of robot 'katana': position"):
         join_robots({"katana": KATANA}, {"katana": (AT[:2], TURN)})
+    for place in (AT, (0.0, 0.0, 1.0), AT.tolist()):
+        with pytest.raises(InvalidValue, match=r"place of robot 'katana' is no pair. Give \(position, rotation\)"):
+            join_robots({"katana": KATANA}, {"katana": place})
+    with pytest.raises(InvalidValue, match="place of robot 'katana': position is 'here'"):
+        join_robots({"katana": KATANA}, {"katana": ("here", TURN)})
     with pytest.raises(InvalidValue, match="there is no robot"):
         join_robots({})
 

@@ -157,12 +157,16 @@ def test_shapes_on_the_base_are_not_tested_against_the_world() -> None:
     assert len(robot.base_shapes) == sum(shape.link == 0 for shape in robot.shapes) == 2
 
 
-@pytest.mark.parametrize(
-    "options", [UrdfOptions(field=0.0), UrdfOptions(field=-1.0), UrdfOptions(field=float("nan")), UrdfOptions(field=9.0)]
-)
-def test_a_field_without_reach_is_refused(options: UrdfOptions) -> None:
+@pytest.mark.parametrize("field", [0.0, -1.0, float("nan"), 9.0, True, "0.03", [0.03]])
+def test_a_field_without_reach_is_refused(field: Any) -> None:
     with pytest.raises(InvalidValue, match="is no distance for a field. Give metres, such as field=0.03"):
-        read_urdf(foreign("r2d2.urdf"), options)
+        read_urdf(foreign("r2d2.urdf"), UrdfOptions(field=field))
+
+
+@pytest.mark.parametrize(("options", "message"), [({"srdf": 5}, "srdf=5 is no path"), ({"home": 5}, "home=5 is no name of a pose")])
+def test_options_of_a_wrong_type_are_refused(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(InvalidValue, match=message):
+        read_urdf(foreign("r2d2.urdf"), UrdfOptions(**options))
 
 
 @pytest.mark.parametrize("corners", [7, 0, -1, 64.0, True, "64", "exact", None])
