@@ -14,7 +14,7 @@ from experiments import chapters
 from experiments.frozen_rules import CONFIRMING_SEED, require_frozen
 from experiments.kit.experiment import MIN_SEEDS, VERDICTS, Claim
 from experiments.kit.raw_records import TooLarge, all_records, keep_record, opened_record, record_path
-from experiments.kit.run_folder import CONFIG, RESULTS, VERSIONS, read
+from experiments.kit.run_folder import CONFIG, RESULTS, VERSIONS, experiment_of, options_of, read
 from experiments.kit.statistics import RATES
 from experiments.registry import BEYOND, CHAPTER7, EXPERIMENTS, current_name, load_experiment
 from mobee.errors import InvalidValue
@@ -48,7 +48,7 @@ is open.
 
 A sweep (`--seeds N`) uses all cores; each finished cell is written to disk, and `--resume` continues after Ctrl-C or a kill.
 `--engine ray` (`pip install "mobee[cluster]"`) uses all machines of the Ray cluster that this machine belongs to, or this machine if there
-is none; MoBeE must be installed on all of them in the same version. `--quick` runs a short version, to check that it works.
+is none; MoBeE must be installed on all of them in the same version. `--quick` runs a short version, without verdicts.
 
 ## Verdicts
 
@@ -163,7 +163,7 @@ def entries_of(found: Mapping[str, Finished]) -> Recorded:
 
 def _entry(name: str, run: Path, versions: Path) -> Entry:
     """Return the entry of a run; its claims are computed from its files by the present rules where they can be."""
-    experiment, options = load_experiment(name), read(run / CONFIG)["options"]
+    experiment, options = load_experiment(name), options_of(run, name)
     is_kept = any(any(run.glob(pattern)) for pattern in experiment.method.kept)
     try:
         results = experiment.method.results(run) if is_kept else read(run / RESULTS)
@@ -185,7 +185,7 @@ def _finished_in(folders: Sequence[Path]) -> Iterator[tuple[str, Path, Path]]:
         for entry in entries:
             if read(entry / RESULTS).get("claims"):
                 run = folder if (folder / VERSIONS).exists() else folder.parent
-                yield current_name(read(entry / CONFIG)["experiment"]), entry, run / VERSIONS
+                yield current_name(experiment_of(entry)), entry, run / VERSIONS
 
 
 def _counts_more(one: Entry, before: Entry) -> bool:
@@ -231,15 +231,17 @@ def _counts(run: Path) -> bool:
 
 
 def _confirms(run: Path) -> bool:
-    return int(read(run / CONFIG)["options"].get("seed", 0)) >= CONFIRMING_SEED
+    return int(options_of(run, experiment_of(run)).get("seed", 0)) >= CONFIRMING_SEED
 
 
 def require_seeds(folders: Sequence[Path], confirms: bool) -> None:
-    """Raise InvalidValue if a run has seeds of the wrong kind; new seeds are those from CONFIRMING_SEED (1000) on.
+    """Raise InvalidValue if a run has seeds of the wrong kind, or is a short one; new seeds are those from CONFIRMING_SEED (1000) on.
 
     `folders`: the folders of the runs.  `confirms`: True: all runs must have new seeds; False: no run may have new seeds.
     """
     for folder in folders:
+        if options_of(folder, experiment_of(folder)).get("quick"):
+            raise InvalidValue(f"{folder} was started with --quick: the table takes whole runs only. Start one without --quick.")
         if _confirms(folder) != confirms:
             said = f"seeds below {CONFIRMING_SEED}, which confirm nothing: leave --confirm out" if confirms else "new seeds: add --confirm"
             raise InvalidValue(f"{folder} has {said}.")

@@ -326,12 +326,13 @@ class Experiment:
         return f"{made or 'no'} {self.repeats.removesuffix('s') if made == 1 else self.repeats}"
 
     def decided(self, results: Mapping[str, Any], options: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the results of a run; with fewer than MIN_SEEDS (5) repetitions, all claims in them become open and keep their numbers.
+        """Return the results of a run; all claims of a short or small run in them become open and keep their numbers.
 
-        `results`: the results as the experiment computed them; they are not changed.  `options`: the options of the run, by name.
+        A run is short if it was started with --quick, and small if it has fewer than MIN_SEEDS (5) repetitions.  `results`: the results as
+        the experiment computed them; they are not changed.  `options`: the options of the run, by name.
         """
-        made = options.get(self.repeats)
-        if "claims" not in results or (made is not None and made >= MIN_SEEDS):
+        made, is_short = options.get(self.repeats), options.get("quick", False)
+        if "claims" not in results or (made is not None and made >= MIN_SEEDS and not is_short):
             return dict(results)
-        why = f"{self.repetitions(made)}, too few for a verdict"
+        why = "a short version, without a verdict" if is_short else f"{self.repetitions(made)}, too few for a verdict"
         return {**results, "claims": [Claim(**claim).undecided(why).record() for claim in results["claims"]]}

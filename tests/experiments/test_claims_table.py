@@ -122,6 +122,21 @@ def test_short_and_unfinished_runs_are_not_taken_by_themselves(tmp_path, claim):
     assert finished_runs(tmp_path) == []
 
 
+def test_a_short_run_gives_no_verdict_and_is_not_written_into_the_table(toy, tmp_path, claim):
+    run = finished(tmp_path, "exploration-coverage", [claim.measured("0.4", True)], quick=True)
+    (entry,) = found_in([run])["exploration-coverage"]["claims"]
+    assert (entry["verdict"], entry["ours"]) == ("open", "0.4 (a short version, without a verdict)")
+    with pytest.raises(UserError, match="was started with --quick: the table takes whole runs only"):
+        command("--write", run)
+
+
+def test_a_run_without_options_is_refused(tmp_path, claim):
+    run = finished(tmp_path, "exploration-coverage", [claim.measured("0.4", True)])
+    write(run / "config.json", {"experiment": "exploration-coverage"})
+    with pytest.raises(InvalidValue, match=r"is not the folder of a run: it has no readable config\.json"):
+        found_in([run])
+
+
 def test_a_run_without_results_is_refused(tmp_path):
     with pytest.raises(InvalidValue, match="has no results: finish the run"):
         found_in([new_run(tmp_path, "exploration-coverage", {})])

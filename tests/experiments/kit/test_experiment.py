@@ -70,6 +70,8 @@ def test_a_verdict_needs_enough_repetitions():
     assert experiment.decided(results, {"starts": MIN_SEEDS}) == results
     assert [experiment.repetitions(made) for made in (1, 5, None)] == ["1 start", "5 starts", "no starts"]
     assert experiment.decided(results, {})["claims"][0]["ours"] == "3.1 (no starts, too few for a verdict)"
+    short = experiment.decided(results, {"starts": MIN_SEEDS, "quick": True})["claims"][0]
+    assert (short["verdict"], short["ours"]) == ("open", "3.1 (a short version, without a verdict)")
 
 
 @pytest.mark.parametrize("name", [name for name in EXPERIMENTS if load_experiment(name).claims])
