@@ -306,15 +306,20 @@ def timed(robot: Robot, path: Array, gains: Gains, speed: float = SPEED, roundin
 
     `speed`: factor on the largest speeds and accelerations. At 1 these are 0.8 of what spring and damping allow (speed max_spring /
     damping, acceleration max_spring / 2), or 0.8 of the motor's own limit if that is lower. `rounding`: a curve replaces the path from this
-    distance [rad] before each corner to this distance after it; 0: the motion stops at every corner. Raises InvalidValue if `speed` is not
-    above 0 and at most 1.
+    distance [rad] before each corner to this distance after it; 0: the motion stops at every corner. For a motor that slides, 1 rad is the
+    length of `mobee.robot.motor_units.motor_units`. Raises InvalidValue if `speed` is not above 0 and at most 1.
     """
     if not 0.0 < speed <= 1.0:
         raise InvalidValue(f"speed {speed}: must be above 0 and at most 1.")
     strength, damping = (gains.of_robot(name, robot) for name in ("max_spring", "damping"))
     fastest = np.minimum(strength / damping, [motor.max_velocity for motor in robot.motor_table])
     hardest = np.minimum(0.5 * strength, [motor.max_acceleration for motor in robot.motor_table])
-    return reference(path, speed * _HARD * fastest, speed * _HARD * hardest, rounding, dt)
+    corners, units = real_array("path", path), motor_units(robot)
+    _require(corners, fastest, hardest, rounding, dt)
+    angles = reference(corners / units, speed * _HARD * fastest / units, speed * _HARD * hardest / units, rounding, dt)
+    q = angles.q * units
+    q[0], q[-1] = corners[0], corners[-1]  # exactly: an end may be at a limit
+    return Reference(angles.times, q, angles.velocity * units, angles.acceleration * units)
 
 
 def attractors(robot: Robot, wanted: Reference, gains: Gains, forces: Callable[[Array], Array] | None = None) -> Iterator[Array]:

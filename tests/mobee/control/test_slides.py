@@ -15,7 +15,7 @@ from mobee.control.gains import Gains
 from mobee.control.law import Law, largest_step
 from mobee.errors import InvalidValue
 from mobee.model.model import Model
-from mobee.roadmap.playback import play
+from mobee.roadmap.playback import play, timed
 from mobee.robot.motor_units import SLIDE_RANGE
 from mobee.robot.robot import Clause, Robot
 from mobee.simulation import MotorParameters, OfflinePlant
@@ -136,3 +136,17 @@ def test_distances_of_a_motion_count_in_the_unit_of_the_slide() -> None:
         assert getattr(sliding, name) == pytest.approx(getattr(turning, name), abs=0.004)  # the encoder noise of slides is smaller
     last = np.abs(sliding.q[-1] - sliding.wanted[-1])
     assert sliding.missing == pytest.approx((last / UNITS).max())
+
+
+@pytest.mark.parametrize("rounding", [0.0, 0.1, 1.0])
+def test_the_motion_along_a_path_is_that_of_turning_motors(rounding: float) -> None:
+    """Corners are rounded by an angle, which is a length for a slide: by 0.1 m, the motion would leave the path by centimetres."""
+    path = np.array([[0.0, 0.0, 0.0], [0.4, 1.2, 0.0], [-0.3, 1.5, 1.6], [0.0, -SLIDE_RANGE / 2, SLIDE_RANGE / 2]])
+    turning, sliding = (
+        timed(TURNING, path, Gains.default(), rounding=rounding),
+        timed(SLIDING, UNITS * path, Gains.default(), rounding=rounding),
+    )
+    assert len(sliding.times) == len(turning.times)
+    for name in ("q", "velocity", "acceleration"):
+        assert getattr(sliding, name) == pytest.approx(UNITS * getattr(turning, name), abs=1e-6)
+    assert np.array_equal(sliding.q[[0, -1]], (UNITS * path)[[0, -1]])
