@@ -4,12 +4,13 @@
 from __future__ import annotations
 
 import secrets
+import shutil
 import socket
 import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import timedelta
 from pathlib import Path
@@ -30,7 +31,8 @@ from services.monitor.web.surfaces import surfaces_of
 
 HOST = "127.0.0.1"
 BATCH = timedelta(seconds=2)  # of a recording: written one by one, updates of the robot take six times the room
-RECORDING, KEY = "recording.rrd", "page.key"  # in the folder of a run
+RECORDING, KEY = "recording", "page.key"  # in the folder of a run; the former without suffix
+ROOM = 20_000_000  # bytes that must be free at the start of a recording: Rerun may wait without end for a disk that is full
 
 
 class NoControls:
@@ -99,9 +101,9 @@ def open_output(config: Config, robot: Robot, now: Callable[[], float]) -> Itera
         controls = LaterControls()
         identity = f"mobee-{secrets.token_hex(4)}"
         file = None
-        if folder is not None:
+        if folder is not None and _has_room(folder):
             file = rr.RecordingStream("mobee", recording_id=identity, batcher_config=_in_batches())
-            sink = rr.FileSink(folder / RECORDING, write_footer=False)  # a footer would keep data of every chunk in memory until the end
+            sink = rr.FileSink(_new_recording(folder), write_footer=False)  # a footer would be kept in memory until the end
             file.set_sinks(sink, default_blueprint=layout)
         frames = Frames(file, layout, identity)
         server, url = None, ""
@@ -130,13 +132,32 @@ def _in_batches() -> rr.ChunkBatcherConfig:
 
 def _key_of(folder: Path | None) -> str:
     """Return a new key, or that of the monitor that ran before in the folder: its pages stay open when it is started again."""
+    key = secrets.token_urlsafe(9)
     if folder is None:
-        return secrets.token_urlsafe(9)
+        return key
     file = folder / KEY
-    if not file.exists():
+    if file.exists() and (kept := file.read_text()):  # it is empty if the disk was full: then everyone would have it
+        return kept
+    with suppress(OSError):  # the page needs no file
         file.touch(mode=0o600)
-        file.write_text(secrets.token_urlsafe(9))
-    return file.read_text()
+        file.write_text(key)
+    return key
+
+
+def _has_room(folder: Path) -> bool:
+    """Return whether the disk has room for a recording; print the reason if it has not."""
+    free = shutil.disk_usage(folder).free
+    if free < ROOM:
+        print(f"the 3D view is not recorded: {folder} has {free / 1e6:.0f} MB left, and needs {ROOM / 1e6:.0f}", file=sys.stderr)
+    return free >= ROOM
+
+
+def _new_recording(folder: Path) -> Path:
+    """Return the path of a new recording: a monitor that is started again must not overwrite that of the monitor before."""
+    number = 1
+    while (path := folder / f"{RECORDING}{f'-{number}' if number > 1 else ''}.rrd").exists():
+        number += 1
+    return path
 
 
 def serve(site: Site, bind: str, port: int) -> PageServer:
