@@ -36,7 +36,8 @@ class Record:
     """The file that records the values of the page, one line of JSON for each value, up to 500 MB.
 
     A line that would exceed this size is not written. While the file cannot be written, for example because the disk is full, the values
-    are lost, and `trouble` is the reason; the file always ends with a complete line. Any thread may write.
+    are lost, and `trouble` is the reason; the file always ends with a complete line. Any thread may write. If the file has values of an
+    earlier monitor, their times are continued: no time is before that of the last line.
     """
 
     def __init__(self, path: Path, now: Callable[[], float]) -> None:
@@ -47,6 +48,8 @@ class Record:
         self._file = path.open("ab", buffering=0)
         self._size = _end_of_lines(path)  # bytes of complete lines
         self._file.truncate(self._size)
+        self._end = _last_time(path)  # s, of an earlier monitor
+        self._shift: float | None = None  # s that are added to the robot's time; None: no time is known yet
         self._waiting = b""  # lines
         self._next: dict[str, float] = {}  # s, by name
         self._now, self._lock = now, Lock()
@@ -59,6 +62,9 @@ class Record:
         body, control and events are never written.
         """
         now = self._now()
+        if self._shift is None and now > 0.0:
+            self._shift = max(0.0, self._end - now)  # the robot may have begun a new run
+        now = self._end if self._shift is None else now + self._shift
         if name in LEFT_OUT or now < self._next.get(name, now):
             return
         if name in SELDOM:
@@ -114,6 +120,18 @@ def _end_of_lines(path: Path) -> int:
         return 0
     with path.open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as content:
         return content.rfind(b"\n") + 1
+
+
+def _last_time(path: Path) -> float:
+    """Return the time in the last line of a file of complete lines; 0 if there is none, or it is not valid."""
+    if not path.stat().st_size:
+        return 0.0
+    with path.open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as content:
+        line = content[content.rfind(b"\n", 0, len(content) - 1) + 1 :]
+    try:
+        return float(json.loads(line)[0])
+    except (ValueError, TypeError, LookupError, RecursionError):
+        return 0.0
 
 
 def entries(path: Path) -> list[Entry]:

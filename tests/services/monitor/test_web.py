@@ -189,6 +189,25 @@ def test_a_record_that_is_continued_begins_after_the_last_complete_line(tmp_path
     assert [(one.time, one.value) for one in entries(path)] == [(1.0, 1), (3.0, 2)]
 
 
+@pytest.mark.parametrize(
+    ("clock", "continued"),
+    [
+        ((0.0, 7.0, 8.0), (5.0, 7.0, 8.0)),  # the monitor was started again
+        ((0.0, 0.5, 2.0), (5.0, 5.0, 6.5)),  # the robot too, which began a new run
+    ],
+)
+def test_the_times_of_a_record_that_is_continued_never_decrease(
+    tmp_path: Path, clock: tuple[float, ...], continued: tuple[float, ...]
+) -> None:
+    path, times = tmp_path / "story.jsonl", iter(clock)
+    path.write_text('[4.0,"q",[0.1]]\n[5.0,"q",[0.2]]\n')
+    record = Record(path, lambda: next(times))
+    for _ in clock:
+        record.put("q", "[0.3]")
+    record.close()
+    assert [one.time for one in entries(path)] == [4.0, 5.0, *continued]
+
+
 def test_a_record_on_a_full_disk_loses_values_and_continues_when_there_is_room(tmp_path: Path) -> None:
     path = tmp_path / "story.jsonl"
     record = Record(path, lambda: 0.0)
