@@ -246,12 +246,16 @@ class BusPlant:
             self._service.call(keys.goal(part, "release"), WithEpoch, Done, epoch=epoch)
 
     def rest(self) -> None:
-        """Release all goals at once, and take none until `resume` is called; an action in progress raises ActionInterrupted."""
+        """Release all goals at once, and take none until `resume` is called; an action in progress raises ActionInterrupted.
+
+        The presented target is removed from the model's world until the next reach, so that another service can present one.
+        """
         self._is_resting = True
         self._wanted.clear()
         for part in list(self._epochs):
             with suppress(CallFailed):  # lost already, or there is no controller
                 self.release(part)
+        self._reaches.withdraw()
 
     def resume(self) -> None:
         """End the rest that `rest` has begun: goals may be taken again."""
@@ -284,7 +288,7 @@ class BusPlant:
         """Release all goals and remove the target; in lockstep, also report that later ticks need not wait for this service."""
         for part in list(self._epochs):
             self.release(part)
-        self._reaches.leave()
+        self._reaches.withdraw()
         self._participant.done(self._service.bus.k, last=True)
 
     def _require_awake(self, part: str) -> None:

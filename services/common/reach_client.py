@@ -44,9 +44,8 @@ class ReachClient:
         """
         if target is not None:
             self._put(target)
-        elif self._is_there:
-            with suppress(InvalidValue):  # another client has removed it already
-                self._call("remove", OneName, name=TARGET)
+        else:
+            self._remove()
         self._target, self._object, self._is_there = target, TARGET, target is not None
 
     def present_object(self, name: str, aim: Aim = "centre", normal: Array | None = None, faces: bool = False) -> ReachTarget:
@@ -114,12 +113,21 @@ class ReachClient:
             after=Outcome(after.q, after.settled, back * tick, after.touched) if back else after,
         )
 
-    def leave(self) -> None:
-        """Remove the target from the model's world, if there is one; it is no error if the model has already ended."""
+    def withdraw(self) -> None:
+        """Remove the target from the model's world until the next reach, so that another service can present one meanwhile.
+
+        It is no error if there is no target, or if the model has already ended.
+        """
         try:
-            self.present(None)
+            self._remove()
         except ActionInterrupted as error:
             self._service.log.info("the target could not be removed: %s", error)
+        self._is_there = False
+
+    def _remove(self) -> None:
+        if self._is_there:
+            with suppress(InvalidValue):  # another client has removed it already
+                self._call("remove", OneName, name=TARGET)
 
     def _put(self, target: ReachTarget) -> None:
         sphere = Geometry(kind="sphere", size=[target.radius])

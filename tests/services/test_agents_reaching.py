@@ -15,7 +15,7 @@ import pytest
 
 from bus_schema import VERSION, keys
 from bus_schema.messages import Event, Learned, Reach, Transition
-from bus_schema.rpc import AddObject, Done, OneName, ReachFor, Started
+from bus_schema.rpc import AddObject, Done, Empty, OneName, ReachFor, Started
 from mobee import load_robot
 from mobee.reach import TARGET
 from mobee.store import STORE
@@ -33,12 +33,13 @@ class FakeReaches(FakeController):
     def __init__(self, rig: Rig, part: str) -> None:
         self.reaches: list[ReachFor] = []
         self.presented: list[list[float]] = []
+        self.removed: list[str] = []
         self.refusals: list[float] = []  # of targets, monotonic clock
         self.refuses = 0  # how many targets are refused because another service presents one
         self._reach = rig.bus.publisher(Reach, part)
         rig.serve(keys.goal("*", "reach"), ReachFor, self._asked)
         rig.serve(keys.world_rpc("add"), AddObject, self._added)
-        rig.serve(keys.world_rpc("remove"), OneName, lambda *_: Done(v=VERSION))
+        rig.serve(keys.world_rpc("remove"), OneName, self._removed)
         super().__init__(rig, part)
 
     def _added(self, request: AddObject, key: str) -> Done:
@@ -47,6 +48,10 @@ class FakeReaches(FakeController):
             self.refusals.append(time.monotonic())
             raise Refusal("owned")
         self.presented.append(request.position)
+        return Done(v=VERSION)
+
+    def _removed(self, request: OneName, key: str) -> Done:
+        self.removed.append(request.name)
         return Done(v=VERSION)
 
     def _asked(self, request: ReachFor, key: str) -> Started:
@@ -144,6 +149,18 @@ def test_an_agent_waits_while_another_service_presents_a_target(stage: tuple[Rig
     assert len(controller.presented) == 1
     first, *later = controller.refusals
     assert later[-1] - first > 1.5  # two waits
+
+
+def test_an_agent_that_rests_leaves_the_target_to_others_and_presents_its_own_afterwards(stage: tuple[Rig, FakeReaches]) -> None:
+    made, controller = stage
+    agent(made)
+    wait_for(lambda: controller.reaches, "a reach")
+    made.call(keys.service_rpc("agent_right_arm", "rest"), Empty, Done, who="monitor")
+    assert controller.removed == [TARGET]
+    presented, reached = len(controller.presented), len(controller.reaches)
+    made.call(keys.service_rpc("agent_right_arm", "resume"), Empty, Done, who="monitor")
+    wait_for(lambda: len(controller.reaches) > reached, "the next reach")
+    assert len(controller.presented) > presented
 
 
 def test_an_unknown_predictor_is_reported_in_one_line(stage: tuple[Rig, FakeReaches]) -> None:

@@ -86,6 +86,15 @@ def test_a_new_model_is_presented_the_target_again(service: FakeService, client:
     assert [verb for verb, _ in service.calls] == ["add", "add"]
 
 
+def test_a_withdrawn_target_is_presented_again_for_the_next_reach(service: FakeService, client: ReachClient) -> None:
+    client.withdraw()
+    client.present(ReachTarget(np.array(AT)))
+    client.withdraw()
+    client.withdraw()
+    assert client.asked()["position"] == AT
+    assert [verb for verb, _ in service.calls] == ["add", "remove", "add"]
+
+
 @pytest.mark.parametrize(
     ("kind", "size", "radius"),
     [("sphere", [0.03], 0.03), ("box", [0.1, 0.2, 0.06], 0.03), ("cylinder", [0.04, 0.06], 0.03), ("capsule", [0.02, 0.3], 0.02)],
@@ -126,7 +135,7 @@ def test_a_refusal_is_a_wrong_value_and_silence_an_interruption(service: FakeSer
         client.present(ReachTarget(np.array(AT)))
     with pytest.raises(ActionInterrupted, match="does not list its objects"):
         client.present_object("ball")
-    client.leave()  # no message is needed
+    client.withdraw()  # no message is needed
 
 
 def test_a_target_that_another_client_has_removed_causes_no_error(service: FakeService, client: ReachClient) -> None:
