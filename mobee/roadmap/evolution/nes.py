@@ -10,7 +10,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mobee.arrays import Array
+from mobee.arrays import Array, real_array
 from mobee.errors import InvalidValue, UnknownName
 
 
@@ -124,6 +124,29 @@ Method = Literal["full", "separable", "xnes", "snes"]
 METHODS: tuple[str, ...] = get_args(Method)
 
 
+def checked_begin(start: ArrayLike, std: ArrayLike) -> tuple[Array, Array]:
+    """Return the first mean (d,) and the first standard deviations (d,) of a search; raises InvalidValue if they are not valid."""
+    mean, spread = real_array("start", start), real_array("std", std)
+    if mean.ndim != 1 or not len(mean) or not np.isfinite(mean).all():
+        raise InvalidValue(f"start has shape {mean.shape}; it must be (d,) finite numbers, d at least 1.")
+    if spread.shape not in ((), (1,), mean.shape):
+        raise InvalidValue(f"std has shape {spread.shape}; it must be one number, or ({len(mean)},) like the start.")
+    if not (np.isfinite(spread).all() and (spread > 0.0).all()):
+        raise InvalidValue(f"std is {std!r}; it must be finite and above 0.")
+    return mean, np.broadcast_to(spread, mean.shape).copy()
+
+
+def checked_costs(costs: ArrayLike, population: int) -> Array:
+    """Return the costs (population,) of a generation; raises InvalidValue for another shape, or if one of them is NaN."""
+    values = real_array("costs", costs)
+    if values.shape != (population,):
+        raise InvalidValue(f"costs have shape {values.shape}; they must be ({population},) numbers, one for each sample.")
+    if np.isnan(values).any():
+        nans = int(np.isnan(values).sum())
+        raise InvalidValue(f"{nans} of {population} costs are NaN; a cost must be a number, inf where a sample is not valid.")
+    return values
+
+
 class NES:
     """A natural evolution strategy: `ask` returns a generation of samples, `tell` updates the search distribution by their costs.
 
@@ -150,21 +173,13 @@ class NES:
         method: Method = "full",
         seed: int | np.random.Generator = 0,
     ) -> None:
-        mean = np.array(start, dtype=np.float64)
-        if mean.ndim != 1 or not len(mean) or not np.isfinite(mean).all():
-            raise InvalidValue(f"start has shape {mean.shape}; it must be (d,) finite numbers, d at least 1.")
+        mean, scale = checked_begin(start, std)
         if method not in METHODS:
             raise UnknownName("method", method, METHODS)
         d = len(mean)
-        try:
-            scale = np.broadcast_to(np.asarray(std, dtype=np.float64), (d,)).copy()
-        except ValueError:
-            raise InvalidValue(f"std has shape {np.shape(std)}; it must be one number, or ({d},) like the start.") from None
-        if not (np.isfinite(scale).all() and (scale > 0.0).all()):
-            raise InvalidValue(f"std is {std!r}; it must be finite and above 0.")
         size = default_population(d) if population is None else population
-        if size < 4:
-            raise InvalidValue(f"population {population}: must be at least 4, or None.")
+        if isinstance(size, bool) or not isinstance(size, int | np.integer) or size < 4:
+            raise InvalidValue(f"population {population!r}: must be a whole number of at least 4, or None.")
         self.mean = mean
         self.sigma = 1.0  # in units of the std at the start
         self.shape = np.ones(d) if method in ("separable", "snes") else np.eye(d)
@@ -193,11 +208,9 @@ class NES:
 
     def tell(self, costs: ArrayLike) -> None:
         """Update the distribution by the costs (population,) of the samples from `ask`; +inf is worst, NaN raises InvalidValue."""
-        values = np.asarray(costs, dtype=np.float64)
+        values = checked_costs(costs, self.population)
         if self._z is None:
             raise InvalidValue("tell without ask: the costs belong to samples; ask first.")
-        if values.shape != (self.population,) or np.isnan(values).any():
-            raise InvalidValue(f"costs have shape {values.shape}; they must be ({self.population},) numbers, none of them NaN.")
         z = self._z[np.argsort(values, kind="stable")]
         self._z = None
         self.generations += 1

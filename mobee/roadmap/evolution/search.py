@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mobee.arrays import Array, Ints
+from mobee.arrays import Array, Ints, real_array
 from mobee.errors import InvalidValue
-from mobee.roadmap.evolution.nes import NES, Method, path_rates
+from mobee.roadmap.evolution.nes import NES, Method, checked_begin, checked_costs, path_rates
 
 _NEGLIGIBLE = 1e-12
 
@@ -142,7 +142,7 @@ class Search:
         method: Method = "full",
         seed: int | np.random.Generator = 0,
     ) -> None:
-        first = np.array(start, dtype=np.float64)
+        first, spread = checked_begin(start, std)
         if limits is None and restart is not None:
             raise InvalidValue("a restart begins at a random place of the box, so it needs limits (d, 2).")
         self._low, self._high = np.zeros(first.shape), np.ones(first.shape)
@@ -153,32 +153,38 @@ class Search:
         self._restart = restart
         self._rng = np.random.default_rng(seed)
         self._first = (first - self._low) / self._width
-        self._std = np.asarray(std, dtype=np.float64) / self._width
+        self._std = spread / self._width
         self._how = population, method
         self._nes = NES(self._first, self._std, population, method, self._rng)
         self._beyond = np.zeros(self._nes.population)
         self._asked = np.empty(0)
         self._known = math.inf  # best cost since the last start, and the one before so many generations
-        self._before, self._since = math.inf, 0
+        self._before: float | None = None
+        self._since = 0
         self.best = first
         self.best_cost = math.inf
         self.evaluations = 0
         self.starts = 1
+
+    @property
+    def population(self) -> int:
+        """Number of samples per generation."""
+        return self._nes.population
 
     def ask(self) -> Array:
         """Return the next generation of samples, (population, d), inside the box."""
         places = self._nes.ask()
         if not self._boxed:
             self._asked = places
-            return places
+            return places.copy()  # the caller may compute in place
         inside = np.minimum(np.maximum(places, 0.0), 1.0)
         self._beyond = ((places - inside) ** 2).sum(axis=1)
         self._asked = np.minimum(self._low + inside * self._width, self._high)  # rounding must not lead out of the box
-        return self._asked
+        return self._asked.copy()
 
     def tell(self, costs: ArrayLike) -> None:
         """Update the search with the costs (population,) of the samples from `ask`; restart it if the condition `restart` holds."""
-        values = np.asarray(costs, dtype=np.float64)
+        values = checked_costs(costs, self._nes.population)
         self._nes.tell(values + PENALTY * self._beyond)
         self.evaluations += len(values)
         least = int(values.argmin())
@@ -189,14 +195,15 @@ class Search:
             self.starts += 1
             start = self._rng.uniform(size=len(self._first)) if self.starts % 2 == 0 else self._first
             self._nes = NES(start, self._std, *self._how, self._rng)
-            self._known = self._before = math.inf
-            self._since = 0
+            self._known, self._before, self._since = math.inf, None, 0
 
     def _stuck(self, restart: Restart) -> bool:
         self._since += 1
         if self._since >= restart.patience:
-            if not self._known < self._before - restart.gain * abs(self._before) and self._before < math.inf:
-                return True
+            if self._before is not None:
+                gain = restart.gain * abs(self._before) if math.isfinite(self._before) else 0.0
+                if not self._known < self._before - gain:
+                    return True
             self._before, self._since = self._known, 0
         return bool(self._nes.std.max() < restart.std)
 
@@ -213,7 +220,7 @@ def minimize(
     method: Method = "full",
     seed: int | np.random.Generator = 0,
 ) -> Minimum:
-    """Minimise a cost until a sample costs at most `target`, or until the number of `evaluations` is used up.
+    """Minimise a cost until a sample costs at most `target`, or until the number of `evaluations`, at least one generation, is used up.
 
     `cost`: takes samples (population, d) and returns their costs (population,). `start` (d,), `std` (one number or (d,)): first mean and
     standard deviation of the search distribution. `limits`: (d, 2) box, in which the samples stay; None: no box. `restart`: when to
@@ -222,6 +229,10 @@ def minimize(
     UnknownName for an argument that is not valid.
     """
     search = Search(start, std, limits, restart, population, method, seed)
+    if not evaluations >= search.population:
+        raise InvalidValue(f"evaluations {evaluations!r}: must be at least {search.population}, one generation.")
+    if math.isnan(target):
+        raise InvalidValue("target is nan; it must be a number, -inf for none.")
     while search.best_cost > target:
         samples = search.ask()
         if search.evaluations + len(samples) > evaluations:
@@ -232,7 +243,7 @@ def minimize(
 
 def _box(limits: ArrayLike, start: Array) -> tuple[Array, Array]:
     """Return the lowest and the highest corner of the box, (d,) each; raises InvalidValue."""
-    box = np.array(limits, dtype=np.float64)
+    box = real_array("limits", limits)
     if box.shape != (*start.shape, 2) or not np.isfinite(box).all() or not (box[:, 0] < box[:, 1]).all():
         raise InvalidValue(
             f"limits have shape {box.shape}; they must be ({len(start)}, 2) finite numbers, the first of a row below the second."

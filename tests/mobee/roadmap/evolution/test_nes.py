@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from mobee.errors import InvalidValue, UnknownName
 from mobee.roadmap.evolution.nes import METHODS, NES, default_population, path_rates, published_utilities
+from mobee.roadmap.evolution.search import Search
 
 D = 4
 seeds = st.integers(0, 10_000)
@@ -183,7 +184,11 @@ def test_an_infinite_cost_is_the_worst() -> None:
         lambda: NES([0.0, 0.0], [1.0, 1.0, 1.0]),
         lambda: NES([0.0], 0.0),
         lambda: NES([0.0, 0.0], [1.0, 0.0]),
+        lambda: NES(0.0, 1.0),
+        lambda: NES(["a"], 1.0),
+        lambda: NES([0.0], "a"),
         lambda: NES([0.0], 1.0, population=3),
+        lambda: NES([0.0], 1.0, population=8.5),
         lambda: NES([0.0], 1.0).tell([1.0] * 4),
     ],
 )
@@ -197,9 +202,13 @@ def test_an_unknown_method_is_refused_with_the_nearest() -> None:
         NES([0.0], 1.0, method="sness")
 
 
-@pytest.mark.parametrize("costs", [[1.0], [1.0, 2.0, np.nan, 3.0]])
-def test_costs_that_do_not_fit_are_refused(costs: list[float]) -> None:
-    es = NES([0.0], 1.0)
+@pytest.mark.parametrize(
+    ("costs", "text"),
+    [([1.0], r"\(1,\); they must be \(4,\)"), ([1.0, 2.0, np.nan, 3.0], "1 of 4 costs are NaN"), (1.0, r"\(\)"), ([1j] * 4, "complex")],
+)
+@pytest.mark.parametrize("make", [NES, Search])
+def test_costs_that_do_not_fit_are_refused(make: type[NES] | type[Search], costs: list[float], text: str) -> None:
+    es = make([0.0], 1.0)
     es.ask()
-    with pytest.raises(InvalidValue, match="costs"):
+    with pytest.raises(InvalidValue, match=text):
         es.tell(costs)

@@ -71,6 +71,34 @@ def test_a_cost_that_no_longer_falls_is_given_up() -> None:
     assert search.starts == 2
 
 
+def hole_in_nothing(x: np.ndarray) -> np.ndarray:
+    """A hole of radius 0.2 far from the start; everywhere else no sample is valid."""
+    far = ((x - 0.8) ** 2).sum(axis=1)
+    return np.where(far < 0.04, far, np.inf)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_search_that_finds_no_valid_sample_begins_again(seed: int) -> None:
+    found = minimize(hole_in_nothing, [0.2] * 3, 0.1, np.tile([0.0, 1.0], (3, 1)), 1e-4, 40_000, Restart(), seed=seed)
+    assert found.cost <= 1e-4 and found.starts > 1
+
+
+def test_the_first_valid_cost_is_a_gain() -> None:
+    search = Search([0.5, 0.5], 0.1, BOX, Restart(std=0.0, patience=2))
+    for cost in (np.inf, np.inf, np.inf, 1.0):
+        search.tell(np.full(len(search.ask()), cost))
+    assert search.starts == 1
+
+
+@pytest.mark.parametrize("limits", [None, BOX])
+def test_a_cost_that_computes_in_place_does_not_change_the_result(limits: np.ndarray | None) -> None:
+    def distance(x: np.ndarray) -> np.ndarray:
+        x -= 0.3
+        return (x**2).sum(axis=1)
+
+    np.testing.assert_allclose(minimize(distance, np.zeros(2), 0.5, limits, target=1e-8).x, 0.3, atol=1e-3)
+
+
 def test_the_same_seed_gives_the_same_search() -> None:
     one, two, other = (minimize(two_holes, [0.5, 0.5], 0.2, BOX, evaluations=300, restart=Restart(), seed=seed) for seed in (4, 4, 5))
     np.testing.assert_array_equal(one.x, two.x)
@@ -122,10 +150,25 @@ def test_the_best_sample_is_kept() -> None:
     np.testing.assert_array_equal(found.x, x)
 
 
-@pytest.mark.parametrize("limits", [[[0.0, 1.0]], [[0.0, 1.0], [1.0, 1.0]], [[0.0, 1.0], [0.0, np.inf]]])
+@pytest.mark.parametrize("limits", [[[0.0, 1.0]], [[0.0, 1.0], [1.0, 1.0]], [[0.0, 1.0], [0.0, np.inf]], [[0.0, 1.0], [0.0]]])
 def test_a_box_that_does_not_fit_is_refused(limits: list[list[float]]) -> None:
     with pytest.raises(InvalidValue, match="limits"):
         Search([0.0, 0.0], 1.0, limits)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "text"),
+    [
+        ({"start": 0.0}, r"start has shape \(\)"),
+        ({"std": [0.1, 0.1, 0.1]}, r"std has shape \(3,\); it must be one number, or \(2,\)"),
+        ({"std": 0.0}, "std is 0.0"),
+        ({"evaluations": 3}, "evaluations 3: must be at least 6"),
+        ({"target": np.nan}, "target is nan"),
+    ],
+)
+def test_arguments_that_do_not_fit_are_refused(wrong: dict[str, object], text: str) -> None:
+    with pytest.raises(InvalidValue, match=text):
+        minimize(two_holes, **({"start": [0.2, 0.2], "std": 0.1, "limits": BOX} | wrong))
 
 
 def test_a_restart_needs_a_box() -> None:
