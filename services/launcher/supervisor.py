@@ -234,7 +234,7 @@ class Supervisor:
             self.bad_settings = True
             self._give_up(child, f"cannot use its settings: {child.last_log_line()}")
         elif code < 0:
-            self._fail(child, f"was killed by {signal.Signals(-code).name}")
+            self._fail(child, f"was killed by {_name(-code)}")
         elif code == 0:
             self._fail(child, "ended, and the launcher had not asked for it")
         else:
@@ -278,3 +278,11 @@ class Supervisor:
         self.stopped_robot = True
         self._stops.stop(reason)
         self._announce("the whole robot is stopped; `mobee estop --reset` releases it")
+
+
+def _name(number: int) -> str:
+    """Return the name of a signal; a real-time signal has none."""
+    try:
+        return signal.Signals(number).name
+    except ValueError:
+        return f"signal {number}"

@@ -163,11 +163,12 @@ def test_a_slow_service_is_not_frozen(launch: Launch) -> None:
     assert summary["restarts"] == {"backlog": 0, "starve": 0}, launched.news
 
 
-def test_a_service_that_is_killed_is_back_within_seconds(launch: Launch) -> None:
+@pytest.mark.parametrize(("number", "name"), [(signal.SIGKILL, "SIGKILL"), (signal.SIGRTMIN + 3, f"signal {signal.SIGRTMIN + 3:d}")])
+def test_a_service_that_is_killed_is_back_within_seconds(launch: Launch, number: int, name: str) -> None:
     launched = launch(toys(one="healthy"))
     launched.wait_for("all ready")
-    launched.children()[0].kill()
-    launched.wait_for("one was killed by SIGKILL")
+    launched.children()[0].send_signal(number)
+    launched.wait_for(f"one was killed by {name}")
     wait_until(lambda: launched.news.count("one is ready") == 2, 20)
     assert launched.news.count("one is ready") == 2
 
