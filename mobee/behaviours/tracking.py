@@ -48,8 +48,7 @@ class TargetTrack:
             raise InvalidValue(f"place {place.tolist()} of the target at {t} s: must be three finite numbers, in m, at a finite time")
         if self._seen and t <= self._seen[-1][0]:
             return
-        expected = self.at(t)
-        if expected is not None and np.linalg.norm(place - expected[0]) > JUMP:
+        if self._seen and np.linalg.norm(place - self._on_line(t)[0]) > JUMP:
             self._seen.clear()
         self._seen.append((t, place))
         while t - self._seen[0][0] > WINDOW:
@@ -63,6 +62,10 @@ class TargetTrack:
         """
         if not self._seen or t - self._seen[-1][0] > self.patience:
             return None
+        return self._on_line(t)
+
+    def _on_line(self, t: float) -> tuple[Array, Array]:
+        """Return what `at` returns, however long ago the last place was seen."""
         times = np.array([time for time, _ in self._seen])
         places = np.array([place for _, place in self._seen])
         if times[-1] - times[0] < LEAST_SPAN:

@@ -19,13 +19,17 @@ def test_the_place_is_extrapolated_over_the_latency(rng: np.random.Generator) ->
     assert moving == pytest.approx(velocity, abs=0.015)
 
 
-def test_after_a_jump_the_target_rests_until_it_was_seen_to_move() -> None:
-    track = TargetTrack()
+@pytest.mark.parametrize("patience", [0.15, 0.6])
+@pytest.mark.parametrize("gap", [0.1, 0.25, 0.45, 0.7])
+def test_after_a_jump_the_target_rests_until_it_was_seen_to_move(gap: float, patience: float) -> None:
+    """Also if it was stale before."""
+    track = TargetTrack(patience)
     for k in range(8):
         track.note(k * 0.1, np.array([0.02 * k, 0.0, 0.0]))
-    track.note(0.8, np.array([0.16, 2.0 * JUMP, 0.0]))
-    place, moving = track.at(0.85)
-    assert place.tolist() == [0.16, 2.0 * JUMP, 0.0] and not moving.any()
+    jumped = [0.14 + 0.2 * gap, 2.0 * JUMP, 0.0]
+    track.note(0.7 + gap, np.array(jumped))
+    place, moving = track.at(0.75 + gap)
+    assert place.tolist() == jumped and not moving.any()
 
 
 def test_a_target_that_was_not_seen_for_long_is_stale() -> None:
