@@ -97,7 +97,8 @@ def rounded(corners: ArrayLike, rounding: float) -> Array:
         here = before
         if cut > 0.0:
             behind = points[k] + cut * directions[k]
-            share = np.linspace(0.0, 1.0, max(4, int(2.0 * cut / STEP)) + 1)[1:, None]
+            # An even number of pieces: where a path turns back on itself, two points beside the middle would be equal.
+            share = np.linspace(0.0, 1.0, 2 * max(2, int(cut / STEP)) + 1)[1:, None]
             found.append((1.0 - share) ** 2 * before + 2.0 * share * (1.0 - share) * points[k] + share**2 * behind)
             here = behind
     return np.concatenate(found)

@@ -79,6 +79,15 @@ def test_a_path_may_go_back_and_forth() -> None:
         rounded([[0.0], [1.0], [1.0], [0.0]], 0.1)
 
 
+@pytest.mark.parametrize("far", [0.011, 0.022, 0.05, 0.13])
+@pytest.mark.parametrize("rounding", [0.1, 0.0251])
+def test_a_path_of_any_length_may_turn_back_on_itself(far: float, rounding: float) -> None:
+    corners = np.array([[0.0, 0.0, 0.0], [far, 0.0, 0.5 * far], [0.0, 0.0, 0.0]])
+    found = reference(corners, SPEEDS, ACCELERATIONS, rounding, DT)
+    np.testing.assert_array_equal(found.q[-1], corners[-1])
+    assert 0.5 * far < found.q[:, 0].max() <= far
+
+
 @pytest.mark.parametrize(
     ("change", "text"),
     [
