@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mobee.arrays import Array
+from mobee.arrays import Array, real_array
 from mobee.errors import InvalidValue, UnknownName
 from mobee.learning.space import MAX_STATES, Space
 from mobee.plant import Outcome
@@ -45,7 +45,7 @@ class DiscreteSpace(Space):
     def __init__(self, states: int, actions: int, goals: ArrayLike | None = None, name: str = "environment") -> None:
         if not 2 <= states <= MAX_STATES or actions < 1:
             raise InvalidValue(f"{states} states and {actions} actions: give 2 to {MAX_STATES} states, and 1 or more actions.")
-        expected = np.tile(np.arange(states)[:, None], (1, actions)) if goals is None else np.array(goals, dtype=np.intp)
+        expected = np.tile(np.arange(states)[:, None], (1, actions)) if goals is None else real_array("goals", goals)
         if expected.shape != (states, actions) or expected.min() < 0:
             raise InvalidValue(f"goals of shape {expected.shape}: give a state for each state and action, shape {(states, actions)}.")
         super().__init__(_robot(states, actions, name), MOTORS[:1], np.arange(float(states))[:, None], expected, rest=0.0)

@@ -9,8 +9,9 @@ from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from mobee.arrays import Array
+from mobee.arrays import Array, checked_seed, real_array
 from mobee.errors import InvalidValue, UnknownName
 from mobee.learning.neighbours import equidistant_goals, lattice_digits, lattice_strides, nearest_goals
 from mobee.learning.object_space import ObjectSpace
@@ -51,6 +52,7 @@ class Lattice(Space):
         rest: float | Sequence[float] = 0.5,
     ) -> None:
         _, indices = checked_joints(robot, joints)
+        self.tie_seed = checked_seed(tie_seed)
         self.levels = _checked_levels(levels, joints)
         """The levels of each joint, as fractions of its range."""
         sizes = tuple(len(one) for one in self.levels)
@@ -61,8 +63,7 @@ class Lattice(Space):
             goals = equidistant_goals(digits, sizes)
         else:
             self.neighbours = checked_neighbours(neighbours, len(digits), also=', or "equidistant"')
-            goals = nearest_goals(fractions, self.neighbours, tie_seed)
-        self.tie_seed = tie_seed
+            goals = nearest_goals(fractions, self.neighbours, self.tie_seed)
         low, high = robot.limits[indices].T
         super().__init__(robot, joints, low + fractions * (high - low), goals, rest)
         self._strides: list[int] = lattice_strides(sizes).tolist()
@@ -103,7 +104,7 @@ def _checked_levels(levels: Levels, joints: Sequence[str]) -> tuple[tuple[float,
         absent = [name for name in joints if name not in levels]
         if absent:
             raise InvalidValue(f"levels of {', '.join(absent)} are missing: give those too, or one sequence for all joints.")
-        each: Sequence[object] = [levels[name] for name in joints]
+        each: Sequence[ArrayLike] = [levels[name] for name in joints]
     elif any(np.ndim(one) for one in levels):
         each = list(levels)
     else:
@@ -120,8 +121,8 @@ def _checked_levels(levels: Levels, joints: Sequence[str]) -> tuple[tuple[float,
     return checked
 
 
-def _checked_fractions(levels: object) -> tuple[float, ...]:
-    given = np.asarray(levels, dtype=np.float64)
+def _checked_fractions(levels: ArrayLike) -> tuple[float, ...]:
+    given = real_array("levels", levels)
     valid = given.ndim == 1 and len(given) >= 2 and (np.diff(given) > 0).all() and given[0] >= 0 and given[-1] <= 1
     if not valid:
         raise InvalidValue(f"levels={levels!r}: give at least two ascending fractions of the joint range in [0, 1], e.g. (.25, .5, .75).")

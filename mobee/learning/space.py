@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mobee.arrays import Array, Ints, real_array
+from mobee.arrays import Array, Ints, checked_seed, real_array
 from mobee.errors import InvalidValue
 from mobee.learning.neighbours import NO_ACTION, edges_of, joined, nearest_finder, nearest_goals, table_of
 from mobee.plant import Outcome
@@ -57,7 +57,7 @@ class Space:
         self, robot: Robot, joints: Sequence[str], samples: ArrayLike, goals: ArrayLike, rest: float | Sequence[float] = 0.5
     ) -> None:
         part, indices = checked_joints(robot, joints)
-        rests = np.asarray(rest, dtype=np.float64)
+        rests = real_array("rest", rest)
         if rests.shape not in ((), (len(part),)) or not ((rests >= 0.0) & (rests <= 1.0)).all():
             raise InvalidValue(
                 f"rest={rest!r}: give the fraction of their range, 0 to 1, at which the part's other motors stay, or one for each of its "
@@ -217,7 +217,7 @@ class Voronoi(Space):
     ) -> None:
         _, indices = checked_joints(robot, joints)
         limits = robot.limits[indices]
-        drawn = isinstance(samples, (int, np.integer))
+        seed, tie_seed, drawn = checked_seed(seed), checked_seed(tie_seed), isinstance(samples, (int, np.integer))
         poses = _drawn_samples(samples, limits, seed) if drawn else _checked_within(samples, limits, joints)
         self.seed, self.tie_seed = seed if drawn else None, tie_seed
         self.neighbours = checked_neighbours(neighbours, len(poses))
@@ -329,9 +329,9 @@ def checked_neighbours(neighbours: object, states: int, also: str = "") -> int:
     """
     if neighbours is None:
         return min(NEIGHBOURS, states - 1)
-    if isinstance(neighbours, bool) or not isinstance(neighbours, int) or not 1 <= neighbours < states:
+    if isinstance(neighbours, bool) or not isinstance(neighbours, int | np.integer) or not 1 <= neighbours < states:
         raise InvalidValue(f"neighbours={neighbours!r}: give a whole number from 1 to {states - 1}{also}.")
-    return neighbours
+    return int(neighbours)
 
 
 def _checked_samples(samples: ArrayLike, joints: int) -> Array:
@@ -344,8 +344,9 @@ def _checked_samples(samples: ArrayLike, joints: int) -> Array:
 
 
 def _checked_goals(goals: ArrayLike, states: int) -> Ints:
-    given = np.array(goals, dtype=np.intp)
-    if given.ndim != 2 or len(given) != states or not ((given >= NO_ACTION) & (given < states)).all():
+    table = real_array("goals", goals)
+    given = table.astype(np.intp)
+    if given.ndim != 2 or len(given) != states or not ((table == given) & (given >= NO_ACTION) & (given < states)).all():
         raise InvalidValue(
             f"goals have shape {given.shape}: give one row of states 0 to {states - 1} for each of the {states} states, -1 at the end."
         )

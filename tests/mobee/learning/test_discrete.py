@@ -54,6 +54,8 @@ def test_what_no_decision_problem_has_is_refused():
         DiscreteSpace(3, 2, goals=[[0, 1]])
     with pytest.raises(InvalidValue, match="states 0 to 2"):
         DiscreteSpace(3, 2, goals=[[0, 1], [0, 1], [0, 7]])
+    with pytest.raises(InvalidValue, match="states 0 to 2"):
+        DiscreteSpace(3, 2, goals=[[0, 1], [0, 1], [0, 1.5]])
     for target in (np.array([0.0, 2.0]), np.array([0.0, 0.5]), np.zeros(3)):
         with pytest.raises(InvalidValue, match="action from 0 to 1"):
             DiscreteSpace(3, 2).action_of(target)

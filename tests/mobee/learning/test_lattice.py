@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -114,6 +116,12 @@ def test_different_spaces_have_different_settings():
     assert len({repr(s.settings) for s in (arm(), arm(tie_seed=1), arm(neighbours="equidistant"), arm(side="r"), torso())}) == 5
 
 
+def test_numbers_of_numpy_make_the_same_space_as_plain_ones():
+    joints = ["l_elbow", "l_shoulder_yaw"]
+    plain, given = (Lattice(toy_robot(), joints, neighbours=kind(4), tie_seed=kind(3)) for kind in (int, np.int64))
+    assert json.dumps(given.settings) == json.dumps(plain.settings)
+
+
 @pytest.mark.parametrize(
     ("joints", "options", "message"),
     [
@@ -127,6 +135,10 @@ def test_different_spaces_have_different_settings():
         (["l_elbow"], {"neighbours": 3}, "from 1 to 2"),
         (["l_elbow"], {"neighbours": "nearest"}, "equidistant"),
         (["l_elbow"], {"neighbours": 2, "rest": 50}, "fraction"),
+        (["l_elbow"], {"rest": "middle"}, "rest is 'middle'"),
+        (["l_elbow"], {"levels": "many"}, "levels is 'many'"),
+        (["l_elbow"], {"tie_seed": -1}, "seed -1"),
+        (["l_elbow"], {"tie_seed": 1.5}, "seed 1.5"),
         ([f"l_{n}" for n in ("shoulder_pitch", "elbow", "wrist_prosup")], {"levels": np.linspace(0, 1, 50)}, "the limit is 100000"),
     ],
 )

@@ -26,6 +26,8 @@ def test_a_space_of_one_s_own_is_its_samples_and_goals():
         (SAMPLES * np.nan, [[1], [2], [0]], "at least two finite poses"),
         (SAMPLES, [[1], [2]], "one row of states"),
         (SAMPLES, [[1], [2], [3]], "one row of states"),
+        (SAMPLES, [[1.5], [2], [0]], "one row of states"),
+        (SAMPLES, [["next"], [2], [0]], "goals is"),
         (SAMPLES, [[-1, 1], [0, 2], [0, 1]], "-1 only after"),
         (SAMPLES, [[-1], [0], [0]], "at least one action"),
     ],

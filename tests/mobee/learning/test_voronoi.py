@@ -98,6 +98,8 @@ def test_a_curious_agent_learns_on_random_samples():
         ([[-0.1, 0.2], [-0.1, np.nan]], {}, "sample 1 has l_shoulder_roll at nan"),
         (20, {"neighbours": 20}, "from 1 to 19"),
         (20, {"neighbours": "equidistant"}, "from 1 to 19"),
+        (20, {"seed": -1}, "seed -1"),
+        (20, {"tie_seed": 1.5}, "seed 1.5"),
     ],
 )
 def test_samples_that_make_no_space_are_refused_with_what_is_valid(samples, options, message):
