@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 
 from mobee.arrays import Array, Ints
-from mobee.errors import MobeeError
+from mobee.errors import InvalidValue, MobeeError
 from mobee.learning.goal import target_states
 from mobee.learning.neighbours import NO_ACTION
 from mobee.learning.space import Space
-from mobee.learning.value_iteration import OutcomeModel, value_iteration
+from mobee.learning.value_iteration import OutcomeModel, require_beliefs_of, value_iteration
 
 
 def steps_between(space: Space, start: int, targets: Ints) -> int:
@@ -122,10 +122,11 @@ class Planner:
         discount: factor per step, in [0, 1); with a smaller one, a short path is preferred more over a reliable path.
 
     Raises:
-        InvalidValue: no such state.
+        InvalidValue: no such state, or beliefs of another space.
     """
 
     def __init__(self, space: Space, beliefs: OutcomeModel, targets: Any, discount: float = DISCOUNT) -> None:
+        require_beliefs_of(space.goals, beliefs)
         self.space, self.beliefs, self.discount = space, beliefs, discount
         self.targets: Ints = target_states(space, targets)
         """The states to reach, ascending."""
@@ -141,7 +142,8 @@ class Planner:
 
         Raises InvalidValue if there is no such state, MobeeError if no path to a target is known.
         """
-        path = [int(target_states(self.space, start)[0])]
+        if len(path := target_states(self.space, start).tolist()) != 1:
+            raise InvalidValue(f"start {start!r}: give the number of one state.")
         probabilities: list[float] = []
         while path[-1] not in self.targets:
             following, probability = self._next(path[-1])

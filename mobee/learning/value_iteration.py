@@ -47,6 +47,15 @@ class OutcomeModel(Protocol):
         """The probability of each outcome, shape (S states, A actions, B outcomes); all 0 for an action that a state does not have."""
 
 
+def require_beliefs_of(goals: Ints, beliefs: OutcomeModel) -> None:
+    """Raise InvalidValue unless an outcome model has as many states and actions as a space, of which `goals` (S, A) is the table."""
+    if np.shape(beliefs.probabilities)[:2] != goals.shape:
+        given = " states, ".join(map(str, np.shape(beliefs.probabilities)[:2]))
+        raise InvalidValue(
+            f"beliefs of {given} actions, for a space of {goals.shape[0]} states, {goals.shape[1]} actions: give those of this space."
+        )
+
+
 class Tabled(ABC):
     """Base of an `OutcomeModel` that caches a table of its outcomes and probabilities in the form that the compiled core reads.
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from mobee.arrays import Array
+from mobee.arrays import Array, real_array
 from mobee.errors import InvalidValue
 from mobee.learning.explorers import Draws, choose
 from mobee.learning.reaching.changes import DETECTORS, NONE, DetectorOf, WorldChanges
@@ -16,7 +16,7 @@ from mobee.learning.reaching.failures import AlikeFailures, Failures, FailuresSi
 from mobee.learning.reaching.predictors import PREDICTORS, PredictorOf, Reaches, RewardPredictor
 from mobee.learning.reaching.reaches import REACH, SCALE, ReachPlanning
 from mobee.learning.reaching.store import Problems, Step, Try, made_of
-from mobee.learning.reaching.strategies import STRATEGIES, StrategyOf
+from mobee.learning.reaching.strategies import STRATEGIES, Strategy, StrategyOf
 from mobee.learning.space import Space
 from mobee.learning.transitions import TransitionModel
 from mobee.learning.value_iteration import OutcomeModel
@@ -76,6 +76,7 @@ class ReachLearner:
 
     Raises:
         UnknownName: no such predictor, strategy, detector or kind of failures.
+        InvalidValue: beliefs or a model of another space.
     """
 
     def __init__(
@@ -97,6 +98,8 @@ class ReachLearner:
         """Number of actions and of problem-tries that have ended, those of the store included."""
         self.last: Try | None = None
         """The newest problem-try that ended."""
+        if model is not None and model.space is not space and model.space.settings != space.settings:
+            raise InvalidValue(f"the model learns {model.space}, the agent acts in {space}: make both with one space.")
         if beliefs is None:
             beliefs = (TransitionModel(space) if model is None else model).debiased()
         self.planning = ReachPlanning(space, beliefs, settings.discount)
@@ -110,6 +113,10 @@ class ReachLearner:
             self.changes = WorldChanges(make_detector, self.planning, self.predictor, self.failures)
         self.discount, self.penalty, self.limit, self.seed = settings.discount, settings.penalty, settings.limit, settings.seed
         self._strategy, self._failures_kind = make_strategy(reaches, self.predictor), settings.failures
+        if not isinstance(self._strategy, Strategy):
+            raise InvalidValue(
+                f"strategy {self._strategy_name!r} made {self._strategy!r}: it needs the methods rewards and add (Strategy)."
+            )
         self._draws, self._draws_of_try, self._draws_of_problem = (
             Draws(f"{space.part} {purpose}") for purpose in ("reaching", "problem-try", "problem")
         )
@@ -154,9 +161,19 @@ class ReachLearner:
         """
         if self._plan is None:
             if self._worth is None:
-                self._worth = self._strategy.rewards(self._target, self._draws_of_try.at(self.seed, self.tries))
+                self._worth = self._checked_rewards(self._strategy.rewards(self._target, self._draws_of_try.at(self.seed, self.tries)))
             self._plan = self.planning.values(self._worth, self.failures.rewards(self._target, float(self._worth.max())))
         return self._plan
+
+    def _checked_rewards(self, given: Any) -> Array:
+        """Return the rewards that the strategy gave; raises InvalidValue unless they are a number for each state, -inf for no reach."""
+        rewards = real_array(f"the rewards of the strategy {self._strategy_name!r}", given)
+        if rewards.shape != (len(self.space),) or not (rewards < np.inf).all() or not (rewards > -np.inf).any():
+            raise InvalidValue(
+                f"strategy {self._strategy_name!r} returned rewards of shape {rewards.shape}: give one for each state, "
+                f"shape ({len(self.space)},), finite, or -inf where no reach is allowed."
+            )
+        return rewards
 
     def decide(self, state: int) -> int:
         """Choose the action to take in a state: the number of a transition, or REACH (-1) to reach for the target.
@@ -260,9 +277,14 @@ def made_predictor(given: str | RewardPredictor | PredictorOf, reaches: Reaches)
     """Return the predictor of rewards that `given` specifies.
 
     `given`: a predictor, which is returned unchanged; a class or function, which is called with `reaches` to make the predictor; the name
-    of a class in `predictors.PREDICTORS`; or the text `module:name` of a class or function. Raises UnknownName for an unknown name.
+    of a class in `predictors.PREDICTORS`; or the text `module:name` of a class or function. Raises UnknownName for an unknown name,
+    InvalidValue if what is made is no predictor.
     """
     if isinstance(given, str | type) or not isinstance(given, RewardPredictor):
-        make: PredictorOf = named("predictor", given, PREDICTORS)[1]  # type: ignore[assignment]  # `named` returns any callable
-        return make(reaches)
+        make: PredictorOf
+        name, make = named("predictor", given, PREDICTORS)
+        made = make(reaches)
+        if not isinstance(made, RewardPredictor):
+            raise InvalidValue(f"predictor {name!r} made {made!r}: it needs add, mean, deviation, sample and settings (RewardPredictor).")
+        return made
     return given

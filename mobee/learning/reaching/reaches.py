@@ -14,7 +14,7 @@ import numpy as np
 from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
 from mobee.learning.space import Space
-from mobee.learning.value_iteration import OutcomeModel, value_iteration
+from mobee.learning.value_iteration import OutcomeModel, require_beliefs_of, value_iteration
 from mobee.model.model import Model
 
 SCALE = 0.01  # m, unit of distances in the published equations; the thesis leaves it open
@@ -92,6 +92,7 @@ class ReachPlanning:
     """
 
     def __init__(self, space: Space, beliefs: OutcomeModel, discount: float) -> None:
+        require_beliefs_of(space.goals, beliefs)
         self.discount, self._beliefs = discount, beliefs
         self._states, self._actions = space.goals.shape
         self._reward: Array = np.full((self._states + 1, self._actions + 1), -np.inf)

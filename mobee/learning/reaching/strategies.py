@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -58,6 +58,7 @@ class Progress:
 OPTIMISM = 2.0  # standard deviations that `ucb` adds to the expected reward
 
 
+@runtime_checkable
 class Strategy(Protocol):
     """The interface of strategies: a strategy computes the rewards that reaches have in a learner's plans while it learns.
 

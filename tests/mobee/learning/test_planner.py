@@ -9,7 +9,8 @@ import pytest
 from mobee.errors import InvalidValue, MobeeError
 from mobee.learning.planner import Planner, passing, shortest_actions, steps_between
 from mobee.learning.tabular import TabularPlant, half_space, ideal
-from tests.mobee.learning.toys import arm
+from mobee.learning.transitions import TransitionModel
+from tests.mobee.learning.toys import arm, torso
 
 
 class Table:
@@ -107,6 +108,10 @@ def test_without_a_path_the_error_names_the_states():
         Planner(SPACE, table, [81])
     with pytest.raises(InvalidValue, match="no such state"):
         Planner(SPACE, table, [80]).plan(-1)
+    with pytest.raises(InvalidValue, match="give the number of one state"):
+        Planner(SPACE, table, [80]).plan([0, 1])
+    with pytest.raises(InvalidValue, match="beliefs of 27 states, 8 actions, for a space of 81 states"):
+        Planner(SPACE, TransitionModel(torso()), [80])
 
 
 DIGITS = np.array(list(product(range(3), repeat=4)))[:, ::-1]  # the first joint is the fastest

@@ -21,7 +21,7 @@ GOAL = ReachTarget(np.array([0.0, 0.0, 0.2]))
 MISSING = np.array([0.09, 0.04, 0.09, 0.0])  # reaching from the last state arrives: rewards .1, .2, .1, 1
 
 
-def corridor(blocked=(), touching=True, start=0, **options) -> ReachAgent:
+def corridor(blocked=(), touching=True, start=0, beliefs=None, **options) -> ReachAgent:
     """An agent in the corridor, whose target blocks the transitions given as (state, action)."""
     chances = np.zeros((4, 2))
     for state, action in blocked:
@@ -33,7 +33,7 @@ def corridor(blocked=(), touching=True, start=0, **options) -> ReachAgent:
             return outcome if touching else Outcome(outcome.q, outcome.settled, outcome.duration)
 
     table = Corridor(ROW, *ideal(ROW), lambda target: (MISSING, chances), start=start)
-    return ReachAgent(ROW, table, None, marker="hand", hands=np.zeros((4, 3)), **options)
+    return ReachAgent(ROW, table, beliefs, marker="hand", hands=np.zeros((4, 3)), **options)
 
 
 def test_at_first_it_reaches_from_where_it_is():
@@ -238,6 +238,40 @@ def test_a_step_that_cannot_be_kept_is_none_and_where_the_part_is_is_measured_an
     assert (reacher.steps, reacher.plant.state, reacher.state) == (0, 1, 1)
     reacher.store.full = False
     assert [state for state, _, _, _ in reacher.try_problem(GOAL).path] == [1, 2]
+
+
+class Returning(Fixed):
+    """A strategy that returns whatever it is made with."""
+
+    def __init__(self, worth):
+        self.worth = worth
+
+
+@pytest.mark.parametrize(
+    "worth", [[0.5, 0.5, 0.5], [[0.5]] * 4, [0.5, np.nan, 0.5, 0.5], [np.inf, 0.5, 0.5, 0.5], [-np.inf] * 4, ["much"] * 4, None]
+)
+def test_rewards_that_are_no_number_for_each_state_are_refused_before_the_robot_moves(worth):
+    reacher = corridor(strategy=lambda reaches, predictor: Returning(worth))
+    with pytest.raises(InvalidValue, match="strategy"):
+        reacher.learn([GOAL], 1)
+    assert reacher.steps == 0
+
+
+def test_rewards_may_be_a_list():
+    reacher = corridor(strategy=lambda reaches, predictor: Returning([0.0, 0.0, 0.0, 1.0]))
+    assert reacher.try_problem(GOAL).reach_state == 3
+
+
+def test_what_is_of_another_space_or_no_strategy_or_predictor_is_refused():
+    other = TransitionModel(SPACE)
+    with pytest.raises(InvalidValue, match="beliefs of 81 states, 16 actions, for a space of 4 states"):
+        corridor(beliefs=other.debiased())
+    with pytest.raises(InvalidValue, match="the model learns <Lattice of left_arm: 81 states"):
+        corridor(model=other)
+    with pytest.raises(InvalidValue, match="made None: it needs the methods rewards and add"):
+        corridor(strategy=lambda reaches, predictor: None)
+    with pytest.raises(InvalidValue, match="made None: it needs add, mean"):
+        corridor(predictor=lambda reaches: None)
 
 
 @pytest.mark.parametrize("counted", [True, False])
