@@ -103,7 +103,7 @@ def fields(subject: Subject) -> Iterator[Finding]:
             else 'give each link that should keep its distance a field: field=".06" at a link, or a shape with field="true"',
         )
         return
-    bare = [subject.robot.links[link] for (link, _), (solids, around) in sorted(links.items()) if solids and not around]
+    bare = list(dict.fromkeys(subject.robot.links[link] for (link, _), (solids, around) in sorted(links.items()) if solids and not around))
     if bare:
         yield Finding(
             "note",

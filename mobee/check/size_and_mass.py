@@ -16,6 +16,7 @@ from mobee.check.interface import Finding, Subject, count, interval, length, som
 from mobee.check.shapes import vertices
 from mobee.model.masses import gravity_torque
 from mobee.robot.bodies import can_be
+from mobee.robot.motor_units import in_metres
 from mobee.robot.robot import Body, Motor, Shape
 
 LARGEST, SMALLEST = 10.0, 0.01  # m: the range of plausible robots
@@ -206,11 +207,12 @@ def _overload(subject: Subject, index: int, at_home: Array, anywhere: Array, lim
     motor = subject.robot.motor_table[index]
     home = bool(at_home[index] > limits[index])
     needed, where = (at_home[index], "at home") if home else (anywhere[index], "in some pose")
+    effort, unit = ("force", "N") if in_metres(subject.robot, motor) else ("torque", "N m")
     return Finding(
         "warning" if home else "note",
         "mass",
         subject.where("motor", motor.name),
-        f"motor {motor.name!r} needs {needed:.3g} N m to hold the robot {where}; its largest torque is {limits[index]:.3g} N m",
+        f"motor {motor.name!r} needs {needed:.3g} {unit} to hold the robot {where}; its largest {effort} is {limits[index]:.3g} {unit}",
         "in the torque modality it gives way under the robot's weight",
-        "check the masses (kg) and centres (m), or the motor's torque limit",
+        f"check the masses (kg) and centres (m), or the motor's {effort} limit",
     )

@@ -165,7 +165,7 @@ def _shifted(one: Placed, joints: int, motors: int, all_motors: int) -> Robot:
         visuals=tuple(map(visual, robot.visuals)),
         cameras={one.name(key): camera(old) for key, old in robot.cameras.items()},
         untested={
-            frozenset(map(link, pair)): f"{one.prefix}: {reason}" if one.prefix else reason for pair, reason in robot.untested.items()
+            frozenset(map(link, pair)): f"{reason} ({one.prefix})" if one.prefix else reason for pair, reason in robot.untested.items()
         },
         where={(kind, own if kind == "clause" else one.name(own)): line for (kind, own), line in robot.where.items()},
     )

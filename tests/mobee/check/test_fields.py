@@ -18,6 +18,12 @@ def test_links_without_a_field_are_counted(tmp_path: Path) -> None:
     assert finding.what == "1 link with solids and without a field: bend"
 
 
+def test_a_link_with_solids_of_several_parts_is_counted_once(tmp_path: Path) -> None:
+    foot = ('<bodypart name="arm">', '<sphere name="foot" radius="0.01" pz="-0.3"/><bodypart name="arm">')
+    (finding,) = named(arm(tmp_path, foot, ('radius="0.03" field="0.05"', 'radius="0.03"')), "field")
+    assert finding.what == "1 link with solids and without a field: base"
+
+
 def test_a_field_smaller_than_its_solid_is_found(tmp_path: Path) -> None:
     findings = named(arm(tmp_path, (FORE, FORE.replace("0.06", "0.015"))), "field")
     assert [finding.severity for finding in findings] == ["warning", "note"]

@@ -7,7 +7,7 @@ import pytest
 
 from mobee.check import Finding, check_robot
 from mobee.robot.load import load_robot
-from tests.mobee.check.arm import arm, named
+from tests.mobee.check.arm import SLIDE, arm, named
 
 UPPER, FORE = '<link name="upper" x="-0.2" radius="0.02" field="0.06">', '<marker name="tip" nx="-1"/>'
 
@@ -45,6 +45,14 @@ def test_a_motor_that_cannot_hold_the_arm_is_named(tmp_path: Path, kilograms: st
     (finding,) = found(tmp_path, fore=f'<mass value="{kilograms}"/>')
     assert finding.severity == severity
     assert finding.what.startswith("motor 'bend' needs ") and where in finding.what and "40 N m" in finding.what
+
+
+def test_the_weight_on_a_slide_is_a_force(tmp_path: Path) -> None:
+    robot = arm(
+        tmp_path, SLIDE[0], ('y="-1"', 'type="prismatic" z="1"'), (UPPER, f'{UPPER}<mass value="2"/>'), (FORE, f'{FORE}<mass value="10"/>')
+    )
+    (finding,) = named(robot, "mass")
+    assert finding.what == "motor 'bend' needs 98.1 N to hold the robot at home; its largest force is 40 N"
 
 
 def test_moments_of_inertia_that_cannot_be_are_noted(tmp_path: Path) -> None:

@@ -43,3 +43,9 @@ def test_shapes_of_one_link_are_rigid(tmp_path: Path) -> None:
 def test_reasons_that_differ_in_a_name_only_are_of_one_kind(tmp_path: Path) -> None:
     robot = replace(arm(tmp_path), untested={frozenset((0, 1)): "adjacent: joint pan", frozenset((1, 2)): "adjacent: joint bend"})
     assert [group.kind for group in untested_groups(robot) if group.reason.startswith("adjacent")] == ["adjacent"] * 2
+
+
+def test_reasons_of_joined_robots_are_of_the_kinds_that_they_are_alone() -> None:
+    groups = untested_groups(load_robot("icub_katana"))
+    assert any(group.reason.endswith("(katana)") for group in groups)
+    assert not any("katana" in group.kind for group in groups)

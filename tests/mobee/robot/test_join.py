@@ -72,7 +72,7 @@ def test_reasons_and_lines_are_kept() -> None:
     robot, shift = both(), len(ICUB.joints)
     for pair, reason in KATANA.untested.items():
         if 0 not in pair:
-            assert robot.untested[frozenset(link + shift for link in pair)] == f"katana: {reason}"
+            assert robot.untested[frozenset(link + shift for link in pair)] == f"{reason} (katana)"
     assert frozenset((0, shift + 1)) not in robot.untested  # the base bears the iCub's pelvis too, which the Katana can reach
     assert robot.where["motor", "katana_arm_0"] == KATANA.where["motor", "arm_0"]
     assert robot.where["marker", "head"] == ICUB.where["marker", "head"]
