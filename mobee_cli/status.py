@@ -96,13 +96,19 @@ def _as_text(status: dict[str, Any]) -> str:
     columns = shutil.get_terminal_size().columns  # 80 in a pipe
     width = 11 if any(service["host"] for service in status["services"].values()) else 0  # on one host there is no such column
     lines = [f"{'service':<16}{'state':<9}{'pid':>7}{'up s':>7}{'restarts':>10}  {'host'[:width]:<{width}}says"]
+    cut = []
     for who, service in status["services"].items():
         refused = sum(service["rejected"].values())
         says = f"refused {refused}; {service['text']}" if refused else service["text"]
-        lines.append(
+        says = printable(" ".join(says.split()))
+        line = (
             f"{who:<16}{service['state']:<9}{_say(service['pid']):>7}{_say(service['uptime_s']):>7}{_say(service['restarts']):>10}  "
-            f"{_say(service['host'])[: max(0, width - 1)]:<{width}}{printable(' '.join(says.split()))}"[:columns].rstrip()
+            f"{_say(service['host'])[: max(0, width - 1)]:<{width}}{says}"
         )
+        lines.append(line[:columns].rstrip())
+        if len(line) > columns and not says.startswith("http"):
+            cut.append(f"{who}: {says}")
+    lines += ["", *cut] if cut else []  # such as the reason of an emergency stop; not cut to the width of the terminal
     pages = [page for service in status["services"].values() for page in re.findall(r"https?://\S+", service["text"])]
     lines += [f"page  {page}" for page in pages]  # not cut to the width of the terminal
     lines += _health_lines(status["services"])
@@ -124,8 +130,16 @@ def _as_text(status: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-_HEALTH = {"rate": "rate Hz", "age_ms": "age ms", "gap_ms": "gap ms", "refused_rate": "ref. /s", "memory_mb": "MB", "files": "files"}
-_BEYOND = {"rate": "rate", "gap": "gap_ms", "refused": "refused_rate", "memory": "memory_mb", "files": "files"}  # column of a warning
+_HEALTH = {
+    "rate": "rate Hz",
+    "age_ms": "age ms",
+    "gap_ms": "gap ms",
+    "refused_rate": "ref. /s",
+    "memory_mb": "MB",
+    "files": "files",
+    "waiting": "waiting",
+}
+_BEYOND = {"gap": "gap_ms", "refused": "refused_rate", "memory": "memory_mb"}  # columns of warnings whose names differ
 
 
 def _health_lines(services: dict[str, Any]) -> list[str]:
@@ -133,11 +147,11 @@ def _health_lines(services: dict[str, Any]) -> list[str]:
     known = {who: service for who, service in services.items() if service["health"]}
     if not known:
         return []
-    lines = ["", f"{'process':<16}{''.join(f'{title:>10}' for title in _HEALTH.values())}"]
+    lines = ["", f"{'process':<16}{''.join(f'{title:>9}' for title in _HEALTH.values())}"]
     for who, service in known.items():
-        marked = {_BEYOND.get(name, "") for name in service["warnings"]}
+        marked = {_BEYOND.get(name, name) for name in service["warnings"]}
         cells = (f"{'!' if name in marked else ''}{_say(service['health'].get(name))}" for name in _HEALTH)
-        lines.append(f"{who:<16}{''.join(f'{cell:>10}' for cell in cells)}")
+        lines.append(f"{who:<16}{''.join(f'{cell:>9}' for cell in cells)}")
     return lines
 
 

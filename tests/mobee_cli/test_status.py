@@ -27,12 +27,28 @@ def service(**changes: object) -> dict[str, object]:
 
 def test_each_process_has_a_row_of_health_in_80_columns_with_bad_numbers_marked(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "80")
-    services = {"robot_sim": service(), "controller": service(warnings=["gap"]), "vision": service(state="down", health={})}
+    services = {
+        "robot_sim": service(),
+        "controller": service(warnings=["gap"]),
+        "model": service(health={**HEALTH, "waiting": 12345}, warnings=["waiting"]),
+        "vision": service(state="down", health={}),
+    }
     text = _as_text({"services": services, "parts": {}, "agents": {}})
-    print(text)
     rows = {line.split()[0]: line.split()[1:] for line in text.split("process ")[1].splitlines()[1:]}
-    assert rows == {"robot_sim": ["100", "4", "1131", "0", "61", "31"], "controller": ["100", "4", "!1131", "0", "61", "31"]}
+    assert rows == {
+        "robot_sim": ["100", "4", "1131", "0", "61", "31", "0"],
+        "controller": ["100", "4", "!1131", "0", "61", "31", "0"],
+        "model": ["100", "4", "1131", "0", "61", "31", "!12345"],
+    }
     assert max(map(len, text.splitlines())) <= 80
+
+
+def test_a_text_that_80_columns_cut_is_whole_below_the_table(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    reason = "emergency stop by mobee since 2026-11-28 12:02:26: the cup has fallen"
+    text = _as_text({"services": {"robot_sim": service(text=reason), "model": service()}, "parts": {}, "agents": {}})
+    assert f"robot_sim: {reason}" in text.splitlines()
+    assert "model: " not in text
 
 
 def test_the_text_of_a_service_moves_no_cursor() -> None:
