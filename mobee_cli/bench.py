@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from experiments.bench.against_cases import CASES
-from experiments.kit.command_line import positive_number, positive_whole
+from experiments.kit.command_line import positive_number, positive_whole, whole
 from experiments.kit.live.floods import FLOODS
 from mobee_cli.errors import UserError
 from services.common.exit_codes import ENVIRONMENT, FAILED, OK
@@ -75,7 +75,7 @@ BENCHES = {
         "the live system in lockstep beside the offline plant: the same agents, action by action, encoder noise included",
         options={
             "--actions": _number("how many to compare, about (default: 100)"),
-            "--seed": _number("of agents and noise (default: 0)", int),
+            "--seed": _number("of agents and noise (default: 0)", whole),
         },
     ),
     "start": Bench(
@@ -111,7 +111,7 @@ BENCHES = {
         quick="two schedules",
         options={
             "--schedules": _number("how many (default: 20)"),
-            "--seed": _number("number of the first schedule (default: 1)", int),
+            "--seed": _number("number of the first schedule (default: 1)", whole),
             "--seconds": _number("how long each lasts (default: 10)", positive_number, "S"),
             "--period": _number("mean time between two faults (default: 4)", positive_number, "S"),
             "--shrink": _number("performances to shrink a schedule that breaks a promise (default: none)"),
@@ -126,7 +126,7 @@ BENCHES = {
             "--layouts": {"nargs": "+", "choices": ("agent", "control"), "help": "what is beyond the network (default: both in turn)"},
             "--seconds": _number("how long each fault lasts (default: 4)", positive_number, "S"),
             "--rounds": _number("how often each fault (default: 1)"),
-            "--seed": _number("of delayed, lost and reordered packets (default: 1)", int),
+            "--seed": _number("of delayed, lost and reordered packets (default: 1)", whole),
         },
     ),
     "fuzz": Bench(
@@ -134,7 +134,7 @@ BENCHES = {
         quick="40 000 messages",
         options={
             "--messages": _number("messages, calls and tokens together (default: 1 000 000)"),
-            "--seed": _number("of what is drawn (default: 1)", int),
+            "--seed": _number("of what is drawn (default: 1)", whole),
         },
     ),
     "soak": Bench(

@@ -32,6 +32,7 @@ from experiments.claims_table import (
     write_page,
 )
 from experiments.frozen_rules import CONFIRMING_SEED, FROZEN, freeze
+from experiments.kit.command_line import whole
 from experiments.kit.experiment import Claim, Experiment
 from experiments.kit.plots import MatplotlibMissing
 from experiments.kit.raw_records import opened_record
@@ -131,7 +132,7 @@ def _options(experiment: Experiment, make_parser: type[argparse.ArgumentParser],
         prog=f"mobee experiment run {experiment.name}", description=notes, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     experiment.method.add_arguments(parser)
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of the random numbers (default: 0)")
+    parser.add_argument("--seed", type=whole, default=0, metavar="N", help="seed of the random numbers (default: 0)")
     parser.add_argument("--runs", type=Path, default=RUNS, metavar="DIR", help="parent of the run's folder (default: runs)")
     parser.add_argument("--resume", nargs="?", const=_NEWEST, type=Path, metavar="RUN", help="resume a run, or the newest one")
     parser.add_argument("--json", action="store_true", help="print the results as JSON")
@@ -147,6 +148,12 @@ def _options(experiment: Experiment, make_parser: type[argparse.ArgumentParser],
     options.resume, seed = run, begun.get("seed")
     if options.seed != seed:
         raise InvalidValue(f"{run} has seed {seed}, not {options.seed}. Start a new run without --resume.")
+    made, asked = (given.get(experiment.repeats) for given in (begun, vars(options)))
+    if made is not None and asked is not None and asked < made:
+        raise InvalidValue(
+            f"{run} was started with {made} {experiment.repeats}, not {asked}: those that are finished would count too. Give {made} or "
+            "more, or start a new run without --resume."
+        )
     if getattr(options, "quick", False) and not begun.get("quick"):
         raise InvalidValue(f"{run} was started without --quick; their results must not be mixed. Start a new run without --resume.")
     return options
@@ -272,7 +279,9 @@ def _figure(arguments: argparse.Namespace) -> int:
     if folder is None and current_name(name) not in EXPERIMENTS and Path(name).is_dir():
         name, folder = experiment_of(Path(name)), Path(name)
     experiment = load_experiment(name)
-    path = experiment.method.figure(given_run(folder, runs, name) if folder else newest_run(runs, name))
+    run = given_run(folder, runs, name) if folder else newest_run(runs, name)
+    options_of(run, name)  # raises InvalidValue for a run of another experiment
+    path = experiment.method.figure(run)
     print(json.dumps({"figure": str(path)}) if arguments.json else path)
     return 0
 

@@ -10,6 +10,13 @@ import time
 from types import TracebackType
 
 
+def whole(text: str) -> int:
+    """Return the whole number of 0 or more that `text` states; raises argparse.ArgumentTypeError for any other text."""
+    if not (text.isascii() and text.isdecimal()):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number of 0 or more")
+    return int(text)
+
+
 def positive_whole(text: str) -> int:
     """Return the whole number of 1 or more that `text` states; raises argparse.ArgumentTypeError for any other text."""
     if not (text.isascii() and text.isdecimal() and int(text) > 0):

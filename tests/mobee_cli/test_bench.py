@@ -84,6 +84,13 @@ def test_a_number_of_objects_out_of_range_is_refused(given: str, capsys: pytest.
     assert "1000" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("bench", ["agree", "faults", "network", "fuzz"])
+def test_a_seed_below_0_is_refused_before_a_system_starts(bench: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        main(["bench", bench, "--seed", "-1"])
+    assert "argument --seed: '-1' is not a whole number of 0 or more" in capsys.readouterr().err
+
+
 def test_a_figure_is_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("matplotlib")
     from experiments.bench.model import BATCH, CALL, MUJOCO, TREES

@@ -13,7 +13,7 @@ import pytest
 
 from experiments.claims.ch2_model import model_throughput
 from experiments.claims.ch7_learning import hypercube_exploration
-from experiments.kit.run_folder import locked
+from experiments.kit.run_folder import locked, new_run
 from experiments.registry import EXPERIMENTS
 from mobee.errors import InvalidValue
 from mobee_cli import experiment
@@ -102,6 +102,18 @@ def test_a_resumed_run_keeps_its_seed(tmp_path, capsys):
     assert f"{folder} has seed 3, not 4" in capsys.readouterr().err
 
 
+def test_a_run_is_not_resumed_with_fewer_seeds(tmp_path, capsys):
+    folder = new_run(tmp_path, "hypercube-exploration", {"seed": 0, "seeds": 10})
+    assert main(["experiment", "run", "hypercube-exploration", "--resume", str(folder), "--seeds", "6"]) == 2
+    assert f"{folder} was started with 10 seeds, not 6: those that are finished would count too." in capsys.readouterr().err
+
+
+def test_the_run_of_another_experiment_is_not_drawn(tmp_path, capsys):
+    folder = new_run(tmp_path, "reward-decay", {"seed": 0})
+    assert main(["experiment", "figure", "hypercube-exploration", str(folder)]) == 2
+    assert f"{folder} is a run of 'reward-decay', not of 'hypercube-exploration'" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
@@ -118,10 +130,10 @@ def test_an_impossible_request_is_refused_in_one_line(arguments, says, capsys):
     assert len(said.splitlines()) == 1
 
 
-@pytest.mark.parametrize("option", [["--objects", "0"], ["--edits", "many"], ["--duration", "nan"], ["--robots", "nao"], ["--objcts", "3"]])
+@pytest.mark.parametrize("option", ["--objects=0", "--edits=many", "--duration=nan", "--robots=nao", "--objcts=3", "--seed=-1"])
 def test_a_wrong_option_of_an_experiment_is_refused_in_one_line(option, capsys):
     with pytest.raises(SystemExit) as ended:
-        main(["experiment", "run", "model-throughput", *option])
+        main(["experiment", "run", "model-throughput", option])
     assert ended.value.code == 2
     said = capsys.readouterr().err
     assert len(said.splitlines()) == 1
