@@ -74,6 +74,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.picture is not None:
         require_picture(arguments.picture)
     trm = map_given(arguments)
+    marker_of(trm)  # by which the arrival is judged: without one, refused before the robot moves
     if arguments.live:
         from mobee_cli.roadmap.live import play_live
 

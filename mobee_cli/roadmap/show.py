@@ -46,18 +46,23 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.view or arguments.save is not None:
         return _show_tour(trm, arguments.save)
     picture: Path = arguments.picture or arguments.map.with_suffix(".png")
-    if len(trm.q):
+    robot = trm.model.robot
+    marker = arguments.marker or (marker_of(trm) if robot.markers or arguments.picture else None)
+    if marker is not None:
+        robot.marker(marker)
+    drawn = len(trm.q) > 0 and marker is not None
+    if drawn:
         require_picture(picture)
-    marker = arguments.marker or marker_of(trm)
-    trm.model.robot.marker(marker)
     result, lines = as_json(trm, arguments.map), [*summary(trm, arguments.map), *edge_summary(trm)]
     if arguments.check:
-        touching = int((~check_edges(trm.model, trm.q, trm.edges, marker=marker)).sum())
+        touching = int((~check_edges(trm.model, trm.q, trm.edges)).sum())
         result["touching"] = touching
         lines += wrapped(f"{touching or 'None'} of the {len(trm.edges)} edges {'has' if touching < 2 else 'have'} contacts.")
-    if len(trm.q):
+    if drawn and marker is not None:
         result["picture"] = str(_draw(trm, marker, picture))
         lines += wrapped(f"Picture of {marker} in all poses: {result['picture']}")
+    elif marker is None:
+        lines += wrapped(f"No picture: robot {robot.name!r} has no markers to draw.")
     print(json.dumps(result, indent=2) if arguments.json else "\n".join(lines))
     return 0
 
@@ -85,15 +90,15 @@ def _draw(trm: Roadmap, marker: str, path: Path) -> Path:
 
 
 def marker_of(trm: Roadmap) -> str:
-    """Return the marker of a roadmap's task: the name of one of the task coordinates begins with the name of this marker.
+    """Return the marker of a roadmap's task: the first word or words in the name of one of the task coordinates.
 
     If there is no such marker, return the one whose position varies most between the poses, or the robot's first marker if the roadmap has
     no poses. Raises UserError if the robot has no markers.
     """
     robot = trm.model.robot
     if not robot.markers:
-        raise UserError(f"robot {robot.name!r} has no markers to show", BAD_INPUT)
-    named = [marker for marker in robot.markers if any(name.startswith(marker) for name in trm.names)]
+        raise UserError(f"robot {robot.name!r} has no markers: add a <marker> to a link of its file", BAD_INPUT)
+    named = [marker for marker in robot.markers if any(f"{name} ".startswith(f"{marker} ") for name in trm.names)]
     if named or not len(trm.q):
         return max(named, key=len) if named else next(iter(robot.markers))  # a name may begin with that of another marker
     pose = trm.model.evaluate(trm.q)

@@ -16,7 +16,7 @@ from mobee.roadmap.roadmap import Roadmap
 from mobee_cli.__main__ import main
 from mobee_cli.errors import UserError
 from mobee_cli.roadmap.live import Running, in_running_world
-from mobee_cli.roadmap.show import TOUR_PLACES, tour
+from mobee_cli.roadmap.show import TOUR_PLACES, marker_of, tour
 from services.common.service import Service
 from tests.services.robots import chain
 
@@ -89,6 +89,27 @@ def test_show_describes_a_map_and_draws_it(say: Say, free: Path, tmp_path: Path,
     assert "None of the 40 edges has contacts" in _flat(out)
     assert f"right_palm in all poses: {tmp_path}" in _flat(out)
     assert drawn[0][1].shape == (25, 41) and drawn[0][2:] == ("right_palm", tmp_path / "a.png")
+
+
+def test_all_of_the_robot_is_checked_along_the_edges_not_only_the_marker(
+    say: Say, free: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("mobee.rendering.sheet.marker_cloud", lambda *given, **_: given[3])
+    trm = mobee.load_roadmap(free)
+    at = trm.model.evaluate(trm.q[2:4].mean(axis=0)).position("right_palm")
+    trm.model.world.add("block", mobee.sphere(0.002), position=at)  # between poses, not in one
+    trm.save(tmp_path / "map.npz")
+    code, out, _ = say("show", tmp_path / "map.npz", "--check", "--marker", "left_palm", "--json")
+    assert code == 0 and json.loads(out)["touching"] >= 1
+
+
+def test_a_marker_whose_name_only_begins_the_name_of_a_coordinate_is_not_that_of_the_map(free: Path) -> None:
+    trm = mobee.load_roadmap(free)
+    robot = trm.model.robot
+    base = replace(robot.marker("left_eye"), name="ya")  # the coordinates are yaw and elbow
+    trm = replace(trm, model=mobee.Model(replace(robot, markers={**robot.markers, "ya": base})))
+    assert marker_of(trm) == "right_palm"
+    assert marker_of(replace(trm, settings=trm.settings | {"names": ["ya x", "elbow"]})) == "ya"
 
 
 def test_a_tour_of_the_map_goes_over_its_edges_from_end_to_end(free: Path) -> None:
@@ -305,6 +326,17 @@ def test_a_task_file_is_built_shown_asked_and_played_for_another_robot(
     assert say("play", path, *robot, "--from", 0.6, 0.8, "--to", 0.8, 0.9)[0] == 0
     code, out, err = say("query", path, "--to", 0.8, 0.9)
     assert code == 2 and out == "" and "--robot FILE" in err
+
+
+def test_a_map_of_a_robot_without_markers_is_described_and_not_played(say: Say, tmp_path: Path) -> None:
+    text = TASK_OF_ANY_ROBOT.replace("joint_1", "arm_0").replace("joint_3", "arm_1").replace("(0.7, 1.0)", "(1.0, 1.3)")
+    (tmp_path / "task.py").write_text(text)
+    path = tmp_path / "task.npz"
+    assert say("build", tmp_path / "task.py", "-o", path, "--method", "least_squares", "--robot", "katana")[0] == 0
+    code, out, _ = say("show", path, "--robot", "katana", "--check")
+    assert code == 0 and "None of the" in out and "No picture: robot 'katana400' has no markers" in _flat(out)
+    code, out, err = say("play", path, "--robot", "katana", "--from", 0.6, 1.1, "--to", 0.8, 1.2)
+    assert code == 2 and out == "" and "has no markers: add a <marker>" in _flat(err)
 
 
 def test_a_path_is_checked_in_another_world(say: Say, arm: Path, tmp_path: Path) -> None:
