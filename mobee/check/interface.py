@@ -68,7 +68,7 @@ class Subject:
     @property
     def is_urdf(self) -> bool:
         """Whether the robot was read from a URDF file; the remedies for some findings are different then."""
-        return any(".urdf:" in line for line in self.robot.where.values())
+        return any(".urdf:" in line.lower() for line in self.robot.where.values())
 
     @cached_property
     def is_mjcf(self) -> bool:

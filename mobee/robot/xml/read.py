@@ -171,7 +171,9 @@ def read_robot(path: Path) -> Robot:
 def _read(path: Path, trail: Trail) -> Robot:
     root = read_xml(path, repair=True)
     if root.tag != ROOT:
-        root.fail("root element", "this is not a robot", "The root of a robot file is <ZeroPositionKinematicTree robotName=...>")
+        remedy = "The root of a robot file is <ZeroPositionKinematicTree robotName=...>"
+        ending = "; a URDF needs a name that ends in .urdf" if root.tag == "robot" else ""
+        root.fail("root element", "this is not a robot", remedy + ending)
     _check_counts(root)
     report(upgrade_robot(root))
     root.check_attributes(KNOWN[ROOT])

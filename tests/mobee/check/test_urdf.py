@@ -34,6 +34,14 @@ def of(path: Path, check: str) -> list[Finding]:
     return [finding for finding in check_file(path).findings if finding.check == check]
 
 
+def test_an_ending_in_upper_case_causes_the_same_findings(file: Path) -> None:
+    upper = file.with_suffix(".URDF")
+    for path in (file, upper):
+        path.write_text(URDF.format(""))
+    said = [[(finding.what, finding.why, finding.remedy) for finding in check_file(path).findings] for path in (file, upper)]
+    assert said[0] == said[1]
+
+
 def test_limits_in_degrees_are_found_with_the_line_of_the_joint(file: Path) -> None:
     file.write_text(URDF.format(""))
     (finding,) = of(file, "joint-limits")

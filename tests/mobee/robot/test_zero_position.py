@@ -276,3 +276,6 @@ def test_a_file_of_another_kind_is_refused(tmp_path: Path) -> None:
     path.write_text("<World/>", encoding="utf-8")
     with pytest.raises(RobotFileError, match="other.xml:1: <world> root element: this is not a robot"):
         read_robot(path)
+    path.write_text("<robot/>", encoding="utf-8")
+    with pytest.raises(RobotFileError, match="this is not a robot.*; a URDF needs a name that ends in .urdf"):
+        read_robot(path)
