@@ -13,7 +13,7 @@ from experiments.kit.command_line import positive_whole
 from experiments.kit.track import add_track, require_tracker, tracked
 from mobee.errors import MobeeError, NotInstalled
 from mobee_cli.errors import UserError
-from mobee_cli.playing.files import Files, is_edited, require_same_robot, robot_as_written, write_files
+from mobee_cli.playing.files import Files, is_edited, robot_as_written, write_files
 from mobee_cli.playing.offline import learn, opened
 from mobee_cli.playing.setup import add_setup_options, setup_of
 from mobee_cli.robot_options import DEFAULT, add_robot, add_world
@@ -51,12 +51,9 @@ def run(arguments: argparse.Namespace) -> int:
         require_tracker(arguments.track)
         setup = setup_of(arguments, arguments.robot or DEFAULT)
         _require_own([files.scenario] if setup.shipped else [files.robot, files.scenario], files.store)
-        robot = robot_as_written(setup)
         for line in setup.lines:
             say(line)
-        with tracked(curves) if arguments.track else nullcontext(), opened(setup, robot, files.store) as learning:
-            if not setup.shipped:
-                require_same_robot(robot, files)  # after the store, which names the option that has changed
+        with tracked(curves) if arguments.track else nullcontext(), opened(setup, robot_as_written(setup), files.store) as learning:
             if is_edited(setup, files):
                 print(f"{files.scenario} was edited, and is kept as it is.", file=sys.stderr)
             write_files(setup, files)  # not before the store is accepted: a refused command changes no file

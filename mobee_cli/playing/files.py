@@ -75,15 +75,14 @@ def robot_as_written(setup: Setup) -> Robot:
 
 
 def require_same_robot(robot: Robot, files: Files) -> None:
-    """Raise UserError if the robot file in `files` exists and has another robot, so that the agents would learn on one and run on another.
+    """Raise InvalidValue if the robot file in `files` exists and has another robot: the agents would learn on one and run live on another.
 
-    `robot`: the robot on which the agents learn. Names, visuals and cameras may differ. Raises MobeeError if the file cannot be read.
+    `robot`: the robot on which the agents learn. Visuals and cameras may differ. Raises MobeeError if the file cannot be read.
     """
     if files.robot.exists() and described(load_robot(files.robot), World()) != described(robot, World()):
-        raise UserError(
-            f"{files.robot} was edited: the agents of {files.store.name} learned with another robot. To learn with the edited one, give it "
-            "as --robot, with another --store; to continue as before, move it away, and it is written again",
-            BAD_INPUT,
+        raise InvalidValue(
+            f"{files.robot} has another robot than this command learns with: it was edited, or an option such as --part differs. Give the "
+            "options of before, or another --store; to learn with the edited robot, give it as --robot, with another --store."
         )
 
 

@@ -19,6 +19,7 @@ from mobee.model.model import Model
 from mobee.robot.robot import Robot
 from mobee.simulation.plant import OfflinePlant
 from mobee.store import Transition, TransitionStore
+from mobee_cli.playing.files import Files, require_same_robot
 from mobee_cli.playing.setup import Setup
 from services.common.worlds import world_around
 
@@ -125,6 +126,8 @@ def opened(setup: Setup, robot: Robot, store: Path) -> Iterator[Learning]:
         stores = {part: open_meanwhile.enter_context(TransitionStore(store, part, durable=False)) for part in setup.agents}
         for one in stores.values():
             _require_robot(one, robot.name)
+        if not setup.shipped:
+            require_same_robot(robot, Files(store))  # before the agent of a new part is recorded
         begun = sum(len(one.load()) for one in stores.values())
         seed = next(iter(setup.agents.values())).seed
         plant = OfflinePlant(model, seed + begun, setup.law, dt=dt, active=list(setup.agents))

@@ -132,6 +132,8 @@ def _parts(texts: list[str]) -> dict[str, tuple[str, ...]]:
     for text in texts:
         name, equals, motors = text.partition("=")
         listed = tuple(filter(None, motors.split(",")))
+        if name in parts:
+            raise InvalidValue(f"--part {text}: {name} is given twice. Give all its motors in one --part.")
         if not equals or not listed or not re.fullmatch(r"[a-z0-9_]+", name):
             raise InvalidValue(f"--part {text}: give a name of a-z, 0-9 and _ and its motors, as --part arm=joint1,joint2.")
         parts[name] = listed

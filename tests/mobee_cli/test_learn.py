@@ -63,6 +63,7 @@ def test_the_scenario_beside_it_names_robot_agents_and_transitions(arm: Path, ca
     ("options", "says"),
     [
         (["--part", "arm"], "--part arm: give a name"),
+        (["--part", "arm=shoulder", "--part", "arm=elbow"], "--part arm=elbow: arm is given twice"),
         (["--part", "arm=shoulder,elbw"], "Did you mean 'elbow'"),
         (["--explorer", "curios"], "Did you mean 'curious'"),
         (["--robot", "nothing.urdf"], "no such file"),
@@ -86,7 +87,14 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.parametrize(
-    "options", [["--explorer", "random"], ["--seed", "1"], ["--seed", "-1"], ["--robot", "katana", "--part", "arm_2=arm_0"]]
+    "options",
+    [
+        ["--explorer", "random"],
+        ["--seed", "1"],
+        ["--seed", "-1"],
+        ["--robot", "katana", "--part", "arm_2=arm_0"],
+        ["--part", "elbow=elbow"],
+    ],
 )
 def test_a_refused_command_leaves_the_files_of_the_store_as_they_are(
     arm: Path, options: list[str], capsys: pytest.CaptureFixture[str]
@@ -159,7 +167,9 @@ def test_files_whose_meaning_was_not_edited_are_kept_silently(arm: Path, capsys:
     assert capsys.readouterr().err == "" and [robot.read_bytes(), scenario.read_bytes()] == before
 
 
-@pytest.mark.parametrize("edit", [('home="0"', 'home="5"', "out.xml was edited"), ("<", "", "out.xml")])
+@pytest.mark.parametrize(
+    "edit", [('home="0"', 'home="5"', "out.xml has another robot than this command learns with: it was edited"), ("<", "", "out.xml")]
+)
 def test_an_edited_robot_is_refused_and_kept(arm: Path, edit: tuple[str, str, str], capsys: pytest.CaptureFixture[str]) -> None:
     assert learned(arm, "--transitions", "3") == 0
     robot = arm.with_name("out.xml")
