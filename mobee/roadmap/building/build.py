@@ -47,9 +47,11 @@ class RoadmapSettings:
             derivatives, then the evolution strategy for the regions in which least squares found no poses.
         neighbours: number of nearest vertices to which each vertex is joined.  None: each vertex is joined to the m nearest of the vertices
             that were found before it; m: dimension of the task space (Algorithm 4).
-        longest: edges along which a motor turns by more than this [rad] are left out.  None: no edge is left out.
-        margin: distance that every motor keeps from its limits [rad], at most a quarter of its range.  MoBeE's control law pushes motors
-            out of the last 10 degrees, so a robot under this law comes to rest only in poses that keep this margin.
+        longest: edges along which a motor turns by more than this [rad], or slides by more than this [m], are left out.  None: no edge is
+            left out.
+        margin: distance that every motor keeps from its limits [rad], at most a quarter of its range; the whole range of a motor that
+            slides counts as 200 degrees.  MoBeE's control law pushes motors out of the last 10 degrees, so a robot under this law comes to
+            rest only in poses that keep this margin.
         search: settings of the searches by evolution strategy.
     """
 

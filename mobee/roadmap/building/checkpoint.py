@@ -19,10 +19,12 @@ from mobee.arrays import Array, Ints
 from mobee.errors import MobeeError
 from mobee.model.model import Model
 from mobee.roadmap.archive import read, world_as_json, write
-from mobee.roadmap.building.tasks import Task
+from mobee.roadmap.building.tasks import Coordinate, Task
 from mobee.roadmap.graph import nearest, nearest_before, short
 from mobee.roadmap.ik.problem import Problem
 from mobee.roadmap.roadmap import Roadmap, digests, load_roadmap
+from mobee.robot.motor_units import unit_name
+from mobee.robot.robot import Robot
 
 _PROBES, _DIGITS = 8, 9  # poses that identify costs and coordinates by their values, and significant digits of these
 
@@ -36,7 +38,7 @@ def request(model: Model, problem: Problem, task: Task, spacing: Array, others: 
         **digests(model),
         "costs": list(problem.by_name),
         "names": list(task.names),
-        "units": [one.unit for one in task.coordinates],
+        "units": [_unit(model.robot, one) for one in task.coordinates],
         "box": task.box.tolist(),
         "spacing": spacing.tolist(),
         "motors": [model.robot.motors[k] for k in problem.free],
@@ -44,6 +46,13 @@ def request(model: Model, problem: Problem, task: Task, spacing: Array, others: 
         "meaning": _meaning(problem, task),
         **others,
     }
+
+
+def _unit(robot: Robot, coordinate: Coordinate) -> str:
+    """Return the unit of a coordinate; that of a motor's position is only known with the robot: a slide has m."""
+    if coordinate.unit == "rad" and coordinate.name in robot.motors:
+        return unit_name(robot, robot.motor_table[robot.motor_index(coordinate.name)])
+    return coordinate.unit
 
 
 def digest(requested: Mapping[str, Any]) -> str:

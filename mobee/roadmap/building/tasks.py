@@ -28,9 +28,10 @@ Range = tuple[float, float]
 class Coordinate:
     """One task coordinate y_i: a number computed from a pose, and the range that the roadmap covers.
 
-    `low`, `high`: the range, in `unit`. `unit`: that of the coordinate, "m", "rad" or "" (no unit). `function`: computes the coordinate
-    (N,) of a batch of poses q (N, n). `aims`: function of the robot and a value; it returns residuals of type `Aim` for least squares. If
-    these are 0 in a pose, the coordinate has this value. None if the coordinate has no derivative. Raises InvalidValue unless low < high.
+    `low`, `high`: the range, in `unit`. `unit`: that of the coordinate, "m", "rad" or "" (no unit); "rad" of a motor that slides means m.
+    `function`: computes the coordinate (N,) of a batch of poses q (N, n). `aims`: function of the robot and a value; it returns residuals
+    of type `Aim` for least squares. If these are 0 in a pose, the coordinate has this value. None if the coordinate has no derivative.
+    Raises InvalidValue unless low < high.
     """
 
     name: str

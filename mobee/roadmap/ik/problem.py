@@ -17,6 +17,7 @@ from mobee.model.model import Model
 from mobee.model.pose import Pose
 from mobee.roadmap.ik.costs import term
 from mobee.roadmap.ik.terms import MOTOR, Aim, Term
+from mobee.robot.motor_units import motor_units
 from mobee.robot.robot import Robot, per_robot
 
 _KNOWN: WeakKeyDictionary[Model, Model] = WeakKeyDictionary()
@@ -106,7 +107,7 @@ class Problem:
         costs: terms, or functions that take poses and their contacts and return residuals, see `mobee.roadmap.ik.costs.term`.
         start: (n,) rad; None: home.
         motors: names of parts and motors that may move; None: all.
-        margin: distance from the limits [rad], at most a quarter of a motor's range.
+        margin: distance from the limits [rad], at most a quarter of a motor's range; the range of a slide counts as 200 deg.
     """
 
     def __init__(
@@ -119,7 +120,7 @@ class Problem:
         if not self.terms:
             raise InvalidValue("costs are empty: give terms of mobee.costs, or functions of pose and contacts.")
         self.free = chosen(robot, motors)
-        self.limits = _within(robot.limits[self.free], margin)
+        self.limits = _within(robot.limits[self.free], margin, motor_units(robot)[self.free])
         self.start = _start(model, start)
         self.start[self.free] = np.clip(self.start[self.free], *self.limits.T)
         self.must = any(one.tolerance is not None for one in self.terms)
@@ -144,11 +145,11 @@ class Problem:
         return total, good
 
 
-def _within(limits: Array, margin: float) -> Array:
-    """Return the limits (d, 2) reduced by a margin at both ends, at most by a quarter of a range."""
+def _within(limits: Array, margin: float, units: Array) -> Array:
+    """Return the limits (d, 2) reduced by a margin at both ends, at most by a quarter of a range; `units`: (d,) what counts as 1 rad."""
     if not (np.isfinite(margin) and margin >= 0.0):
         raise InvalidValue(f"margin {margin!r} rad: must be finite and at least 0.")
-    kept = np.minimum(margin, 0.25 * (limits[:, 1] - limits[:, 0]))
+    kept = np.minimum(margin * units, 0.25 * (limits[:, 1] - limits[:, 0]))
     return np.stack([limits[:, 0] + kept, limits[:, 1] - kept], axis=1)
 
 

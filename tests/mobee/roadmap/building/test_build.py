@@ -38,6 +38,13 @@ def whole(model: mobee.Model) -> mobee.Roadmap:
     return _build(model)
 
 
+RAIL = """<robot name="rail"><link name="base"/>
+<joint name="slide" type="prismatic"><parent link="base"/><child link="cart"/><axis xyz="1 0 0"/>
+<limit lower="-2" upper="2" velocity="1" effort="9"/></joint><link name="cart"/>
+<joint name="turn" type="revolute"><parent link="cart"/><child link="tip"/><origin xyz="0 0 0.2"/><axis xyz="0 0 1"/>
+<limit lower="-2" upper="2" velocity="1" effort="9"/></joint><link name="tip"/></robot>"""
+
+
 class Cut(Exception):
     """Interrupts a building."""
 
@@ -90,6 +97,17 @@ def test_motors_keep_the_margin_from_their_limits(method: str, model: mobee.Mode
     assert (trm.q[:, free] >= low + kept).all() and (trm.q[:, free] <= high - kept).all()
     with pytest.raises(mobee.InvalidValue, match="margin"):
         _build(model, margin=-0.1)
+
+
+def test_a_slide_has_metres_and_the_margin_of_the_control_law(tmp_path: Path) -> None:
+    (tmp_path / "rail.urdf").write_text(RAIL)
+    robot = mobee.load_robot(tmp_path / "rail.urdf")
+    task = mobee.tasks.motors({"slide": (-2.0, 2.0), "turn": (-1.0, 1.0)})
+    settings = mobee.RoadmapSettings(method="least_squares", margin=np.deg2rad(10.0))
+    trm = mobee.build_roadmap(mobee.Model(robot), [mobee.costs.home()], task, (0.1, 0.5), settings=settings)
+    assert trm.settings["units"] == ["m", "rad"]
+    zone = 4.0 * 10.0 / 200.0  # m, the limit zone of the default gains
+    assert 1.7 < np.abs(trm.q[:, 0]).max() <= 2.0 - zone
 
 
 def test_the_same_seed_gives_the_same_map_for_any_number_of_threads(
