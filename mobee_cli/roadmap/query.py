@@ -9,12 +9,15 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mobee.arrays import Array
 from mobee.control.gains import Gains
 from mobee.errors import InvalidValue, MobeeError
+from mobee.model.kinematics import tables
 from mobee.roadmap.playback import timed
 from mobee.roadmap.roadmap import Roadmap
+from mobee.robot.motor_units import motor_units
 from mobee_cli.errors import UserError
 from mobee_cli.roadmap.map_file import COLUMNS, PLACES, add_map, add_places, map_given, start_of, wrapped
 from services.common.exit_codes import FAILED
@@ -47,8 +50,9 @@ def find_path(trm: Roadmap, start: Array, goal: list[float]) -> dict[str, Any]:
     """Return the shortest path without contacts as plain JSON data.
 
     If there is none, return the shortest path with contacts, and the reason. `start`: posture (n,) rad. `goal`: task coordinates. A motor
-    that the roadmap does not move stays where it is if it is less than 0.25 rad from its position in the roadmap; otherwise the path moves
-    it to this position. Raises UserError if the roadmap has no path at all.
+    that the roadmap does not move, and that carries no marker of the roadmap's coordinates and costs, stays where it is if it is less than
+    0.25 rad from its position in the roadmap (the range of a slide counts as 200 deg); otherwise the path moves it to this position.
+    Raises UserError if the roadmap has no path at all.
 
     Keys of the result: "vertices": indices of the path's vertices. "place": task coordinates of the last one; "missing": its distance from
     the goal in each task coordinate, in multiples of the distance between vertices. "poses": (K, n) rad, from the start. "length": length
@@ -58,8 +62,10 @@ def find_path(trm: Roadmap, start: Array, goal: list[float]) -> dict[str, Any]:
     otherwise empty.
     """
     shortest = _shortest(trm, start, goal)
-    stay = np.abs(start - trm.q[shortest[0]]) < NEAR_TURN
-    stay[[trm.model.robot.motor_index(name) for name in trm.motors]] = False
+    robot = trm.model.robot
+    stay = np.abs(start - trm.q[shortest[0]]) < NEAR_TURN * motor_units(robot)
+    stay[[robot.motor_index(name) for name in trm.motors]] = False
+    stay &= ~_carries(trm)  # else the markers would not be where the map has them
     trm = replace(trm, q=np.where(stay, start, trm.q))
     why = ""
     try:
@@ -85,6 +91,18 @@ def find_path(trm: Roadmap, start: Array, goal: list[float]) -> dict[str, Any]:
         "free": not why,
         "why": why,
     }
+
+
+def _carries(trm: Roadmap) -> NDArray[np.bool_]:
+    """Return whether each motor moves a marker that the names of the roadmap's coordinates or costs have, (n,)."""
+    robot, known = trm.model.robot, tables(trm.model.robot)
+    words = " ".join([*trm.names, *trm.settings.get("costs", ())]).split()
+    above = np.zeros(len(robot.joints), dtype=bool)
+    for name, marker in robot.markers.items():
+        if name in words:
+            above[known.ancestry[marker.link]] = True
+    moves: NDArray[np.bool_] = np.abs(known.coupling) @ above > 0.0
+    return moves
 
 
 def require_free(trm: Roadmap, path: dict[str, Any], anyway: bool) -> None:

@@ -16,6 +16,7 @@ from mobee.roadmap.roadmap import Roadmap
 from mobee_cli.__main__ import main
 from mobee_cli.errors import UserError
 from mobee_cli.roadmap.live import Running, in_running_world
+from mobee_cli.roadmap.query import find_path
 from mobee_cli.roadmap.show import TOUR_PLACES, marker_of, tour
 from services.common.service import Service
 from tests.services.robots import chain
@@ -139,6 +140,19 @@ def test_a_path_from_home_begins_at_home(say: Say, free: Path) -> None:
     assert found["poses"][0] == robot.home.tolist() and found["entry"] > 0.2
     again = json.loads(say("query", free, "--to", 0, 0, "--from", *robot.home, "--json")[1])
     assert again["poses"] == found["poses"]
+
+
+@pytest.mark.parametrize("names", [["right_palm x", "elbow"], ["yaw", "elbow"]])
+def test_the_path_moves_motors_that_carry_a_marker_of_the_map(free: Path, names: list[str]) -> None:
+    trm = mobee.load_roadmap(free)
+    robot = trm.model.robot
+    trm = replace(trm, settings=trm.settings | {"names": names})
+    torso, left = robot.motor_index("torso_yaw"), robot.motor_index("l_elbow")
+    start = trm.q[0].copy()
+    start[[torso, left]] += 0.15
+    end = np.array(find_path(trm, start, [0.4, 0.2])["poses"][-1])
+    assert end[left] == start[left]
+    assert end[torso] == (trm.q[22, torso] if names[0] != "yaw" else start[torso])
 
 
 def test_a_path_avoids_an_obstacle(say: Say, blocked: Path) -> None:
