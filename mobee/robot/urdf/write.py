@@ -84,20 +84,16 @@ class GeometryWriter:
         return geometry
 
     def _mesh(self, shape: Shape) -> str:
-        """Write the hull as a text STL, since a binary one has only seven digits; return its path relative to the URDF's folder."""
+        """Write the hull as an OBJ, which other programs read and which keeps all digits; return its path relative to the URDF's folder."""
         if shape.vertices is None:
             raise InvalidValue(f"the convex shape {shape.name!r} has no vertices.")
         self.folder.mkdir(exist_ok=True)
-        name = f"{re.sub(r'[^A-Za-z0-9_]', '_', shape.name)[:60]}_{self.written}.stl"
+        name = f"{re.sub(r'[^A-Za-z0-9_]', '_', shape.name)[:60]}_{self.written}.obj"
         self.written += 1
-        lines = ["solid hull"]
-        for corners in facets(shape.vertices):
-            normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
-            lines.append(f"facet normal {numbers(normal / max(float(np.linalg.norm(normal)), 1e-300))}")
-            lines.append("outer loop")
-            lines += [f"vertex {numbers(corner)}" for corner in corners]
-            lines += ["endloop", "endfacet"]
-        (self.folder / name).write_text("\n".join([*lines, "endsolid hull", ""]), encoding="ascii")
+        triangles = facets(shape.vertices)
+        lines = [f"v {numbers(corner)}" for corner in triangles.reshape(-1, 3)]
+        lines += [f"f {first} {first + 1} {first + 2}" for first in range(1, 3 * len(triangles), 3)]
+        (self.folder / name).write_text("\n".join([*lines, ""]), encoding="ascii")
         return f"{self.folder.name}/{name}"
 
 

@@ -113,6 +113,24 @@ def test_other_programs_get_solids_to_see_and_to_touch(tmp_path: Path) -> None:
         assert geometries <= {"sphere", "cylinder", "box", "mesh"}
 
 
+def test_other_programs_read_the_hulls(tmp_path: Path) -> None:
+    robot = load_robot(foreign("xarm/xarm6_with_gripper.urdf"))
+    path = write_urdf(robot, tmp_path / "x.urdf")
+    hulls = sum(shape.kind == "convex" for shape in robot.shapes)
+    assert hulls > 0
+    mujoco = pytest.importorskip("mujoco")
+    spec = mujoco.MjSpec.from_file(str(path))
+    assert len(spec.meshes) == hulls and spec.compile().nmesh == hulls
+    pybullet = pytest.importorskip("pybullet")
+    client = pybullet.connect(pybullet.DIRECT)
+    try:
+        body = pybullet.loadURDF(str(path), useFixedBase=True, physicsClientId=client)
+        links = range(-1, pybullet.getNumJoints(body, physicsClientId=client))
+        assert sum(len(pybullet.getCollisionShapeData(body, link, physicsClientId=client)) for link in links) == hulls
+    finally:
+        pybullet.disconnect(client)
+
+
 def test_bullet_moves_the_written_icub_as_the_model_does(tmp_path: Path) -> None:
     bullet = pytest.importorskip("pybullet")
     robot = load_robot("icub")
