@@ -361,12 +361,15 @@ class Picker:
         """Return a model of the robot with the thing in its hand, a little enlarged, among what is around it."""
         model, marker, q = self.grasp.model, self.grasp.marker, self.body.q
         world, pose = World(), model.evaluate(q)
-        for name, item in model.world.objects.items():
+        for name, item in pose.objects.items():
             if item.role != "ghost":
                 world.add(name, Geometry(item.kind, item.size), position=item.position, rotation=item.rotation)
         centre = pose.position(marker) + pose.rotation(marker) @ (self._gripped(thing) + slipped)
         world.add(CARRIED, cylinder(thing.radius, thing.height).grown(CLEAR), position=centre)
         found = Model(model.robot, world)
+        for name, item in model.world.objects.items():
+            if item.link is not None and name in world.objects:
+                found.attach(name, item.link, q)
         found.attach(CARRIED, model.robot.links[model.robot.marker(marker).link], q)
         return found
 
@@ -398,7 +401,7 @@ def touches(model: Model, path: Array) -> bool:
 
     Postures about 0.03 rad apart are checked.
     """
-    pieces = []
+    pieces = [path[:0]]
     for start, end in zip(path, path[1:], strict=False):
         count = max(1, int(np.ceil(np.abs(end - start).max() / STEP)))
         pieces.append(start + np.arange(1, count + 1)[:, None] / count * (end - start))

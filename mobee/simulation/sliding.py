@@ -95,7 +95,7 @@ class SlidingObject:
         return {} if self._place is None else {self.name: self._place.copy()}
 
     def put_back(self) -> bool:
-        """Put the object to its first place, also if it has not fallen; return whether this was possible.
+        """Put the object to its first place, also if it has not fallen or was removed from the world; return whether this was possible.
 
         If a solid of the robot is in this place, or within 3 cm of its side, nothing changes and False is returned.
         """
@@ -103,7 +103,7 @@ class SlidingObject:
             return False
         first, world = self._first, self._plant.model.world
         self._alone.move(self.name, position=first.position)
-        if self._place is None:
+        if self.name not in world.objects:  # fallen, or the caller has removed it
             shape = Geometry(first.kind, first.size)
             world.add(
                 self.name, shape, position=first.position, rotation=first.rotation, role=first.role, color=first.color,

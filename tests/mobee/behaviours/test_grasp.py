@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -12,7 +13,7 @@ import mobee
 from mobee import Controller, Model
 from mobee.behaviours.bump import START, THRESHOLD, TICKS, BumpWatch
 from mobee.behaviours.grasp import Grip, SideGrasp, palm_beside
-from mobee.behaviours.pick import Upright, is_free, places_near, pre_grasps
+from mobee.behaviours.pick import Picker, Upright, is_free, places_near, pre_grasps
 from mobee.behaviours.pre_grasp import MARKER, MOTORS, WATCHED, MapPlanner, aside, icub_starts, is_around, pre_grasp_map
 from mobee.control.gains import Gains
 from mobee.model.masses import gravity_torque
@@ -113,6 +114,37 @@ def test_there_is_no_pre_grasp_where_things_fill_the_room_of_the_hand() -> None:
     world.remove("ball")
     world.add("wall", mobee.box(0.3, 0.02, 0.2), position=(-0.3, 0.16, 0.0))
     assert not pre_grasps(SideGrasp(Model(robot(), world), MARKER, MOTORS, icub_starts(robot())), CUP)
+
+
+def test_a_path_of_one_posture_is_free() -> None:
+    """Its first posture is not checked."""
+    assert is_free(grasp().model, robot().home[None])
+
+
+def test_what_another_hand_carries_stays_in_it_in_plans_to_put_a_thing_down() -> None:
+    model = Model(robot(), mobee.load_world("table"))
+    hold = robot().home.copy()
+    held = model.evaluate(hold).position("left_palm")
+    model.world.add("tool", mobee.sphere(0.02), position=held)
+    model.attach("tool", robot().links[robot().marker("left_palm").link], hold)
+    picker = Picker(Still(hold), SideGrasp(model, MARKER, MOTORS, icub_starts(robot())), WATCHED)
+    found = picker._model_with(CUP, np.zeros(3))
+    moved = hold.copy()
+    moved[robot().motor_index("l_shoulder_roll")] += 0.3
+    for q in (hold, moved):
+        np.testing.assert_allclose(found.evaluate(q).objects["tool"].position, model.evaluate(q).position("left_palm"), atol=1e-12)
+
+
+@dataclass
+class Still:
+    """A body that does not move."""
+
+    q: np.ndarray
+
+    def follow_path(self, path, speed, watch=None, forces=None):
+        raise NotImplementedError
+
+    press = rest_at = follow_path
 
 
 def test_places_where_the_hand_came_from_are_first() -> None:

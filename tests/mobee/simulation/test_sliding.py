@@ -101,6 +101,14 @@ def test_it_falls_where_it_is_pressed_from_above() -> None:
     assert cup.falls >= 1
 
 
+def test_it_is_put_back_after_the_caller_has_removed_it() -> None:
+    plant, cup = stage()
+    plant.act("trunk", np.array([1.0]))
+    plant.model.world.remove("cup")
+    plant.run(20)
+    assert cup.put_back() and plant.model.world.objects["cup"].position[:2].tolist() == list(BESIDE)
+
+
 def test_it_is_put_back_on_request_unless_the_robot_is_near() -> None:
     plant, cup = stage()
     plant.act("trunk", np.array([-0.4]))
