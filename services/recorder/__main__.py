@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from services.common.config import load_config
 from services.common.entry import explained, robot_of
@@ -20,17 +20,18 @@ def main(argv: Sequence[str] | None = None) -> None:
         record("recorder", config)
 
 
-def record(who: str, config: Config) -> None:
+def record(who: str, config: Config, settings: Mapping[str, bytes] | None = None) -> None:
     """Record messages until a signal or a shutdown call.
 
-    `who`: name of this service on the bus. Raises MobeeError or BusUnreachable if the recording cannot begin.
+    `who`: name of this service on the bus. `settings`: as those of `RecorderNode`. Raises MobeeError or BusUnreachable if the recording
+    cannot begin.
     """
     robot = robot_of(config)
     spare_threads()  # messages arrive one by one: handing each from thread to thread costs more than it
     if not config.everything:  # pictures are larger
         spare_memory()
     with Service(who, config, robot) as service:
-        node = RecorderNode(service, config, robot)
+        node = RecorderNode(service, config, robot, settings)
         service.ready()
         node.lower_priority()
         try:

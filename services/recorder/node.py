@@ -114,9 +114,11 @@ def frequent_keys(parts: Iterable[str], everything: bool) -> list[str]:
 class RecorderNode:
     """Writes all messages unchanged, and copies of some of them, in JSON or as ROS 2 messages, for viewers."""
 
-    def __init__(self, service: Service, config: Config, robot: Robot) -> None:
+    def __init__(self, service: Service, config: Config, robot: Robot, settings: Mapping[str, bytes] | None = None) -> None:
+        """Begin to record. `settings`: content of the settings files of the services, by name; None: those in the folder of the run."""
         self._service, self._folder, self._keep_free = service, Path(config.run_dir), int(config.keep_free * _MEGABYTE)
-        self._files = Files(self._folder, int(config.largest * _MEGABYTE), _settings_in(self._folder))
+        settings = _settings_in(self._folder) if settings is None else settings
+        self._files = Files(self._folder, int(config.largest * _MEGABYTE), settings)
         self._views = Views(robot, config.pose_rate, config.json_rate)
         self._channels: dict[tuple[str, str], tuple[Channel, str]] = {}  # of a key and an encoding, with the type of the messages
         self._kinds = {encoding_of(cls): cls.__name__ for cls in streams()}
