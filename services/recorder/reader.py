@@ -30,7 +30,8 @@ class Recording:
     def __init__(self, place: Path) -> None:
         """Find the files; `place`: a file or a folder. Raises MobeeError if there are none, or one of them is not an MCAP file."""
         try:
-            self.files = parts_of(place) if place.is_dir() else [place]
+            # A file is empty for half a second after its begin, and remains so if the recorder is killed then.
+            self.files = [path for path in parts_of(place) if path.stat().st_size] if place.is_dir() else [place]
             for path in self.files:
                 with path.open("rb") as file:
                     if file.read(8) != b"\x89MCAP0\r\n":

@@ -110,6 +110,15 @@ def test_a_new_recorder_in_a_folder_continues_in_a_new_file(tmp_path: Path) -> N
     assert [path.name for path in parts_of(tmp_path)] == ["messages-0000.mcap", "messages-0001.mcap", "messages-0002.mcap"]
 
 
+def test_an_empty_last_file_does_not_hide_those_before_it(tmp_path: Path) -> None:
+    writer = Writer(tmp_path)
+    writer.tick(1)
+    writer.files.close()
+    writer.tick(2)  # in the second file, not flushed: what a kill loses
+    assert [path.stat().st_size > 0 for path in parts_of(tmp_path)] == [True, False]
+    assert [one.payload for one in Recording(tmp_path)] == [message(1)]
+
+
 def test_a_reader_of_others_finds_the_index(tmp_path: Path) -> None:
     writer = Writer(tmp_path)
     writer.tick(1)
