@@ -8,7 +8,9 @@ structs to JSON and back.  Unlike msgspec's own JSON, in which infinity becomes 
 from __future__ import annotations
 
 import csv
+import io
 import json
+import os
 import platform
 import re
 import shutil
@@ -20,7 +22,7 @@ from dataclasses import dataclass, fields
 from importlib import metadata
 from pathlib import Path
 from types import TracebackType
-from typing import Any, ClassVar, Self, TextIO, TypeVar
+from typing import Any, ClassVar, Self, TypeVar
 
 import msgspec
 
@@ -224,8 +226,9 @@ class Records:
 
     def __init__(self, path: Path, columns: tuple[str, ...]) -> None:
         self.path, self.columns = path, columns
-        self._file = path.open("a+", newline="")
-        self._file.truncate(_whole(self._file))
+        self._file = path.open("a+", newline="", encoding="utf-8")
+        self._file.truncate(len(_whole(path)))
+        self._file.seek(0, os.SEEK_END)
         self._writer = csv.DictWriter(self._file, columns)
 
     def append(self, record: Mapping[str, object]) -> None:
@@ -243,22 +246,35 @@ class Records:
 
 
 def read_records(path: Path, columns: tuple[str, ...]) -> list[dict[str, str]]:
-    """Return all complete records of a CSV file, each as a dict from column name to text, with these columns; [] if there is no file."""
+    """Return all complete records of a CSV file, each as a dict from column name to text, with these columns; [] if there is no file.
+
+    Raises InvalidValue if the file is damaged, or lacks one of the columns.
+    """
     if not path.exists():
         return []
-    with path.open(newline="") as file:
-        length = _whole(file)
-        file.seek(0)
-        rows = list(csv.DictReader(file.read(length).splitlines()))
-    return [{column: row[column] for column in columns} for row in rows]
+    try:
+        reader = csv.DictReader(io.StringIO(_whole(path).decode(), newline=""))
+    except UnicodeDecodeError as error:
+        raise InvalidValue(f"{path} is damaged ({error}): restore it, or start a new run without --resume.") from None
+    names, rows = tuple(reader.fieldnames or columns), []
+    if absent := [column for column in columns if column not in names]:
+        raise InvalidValue(
+            f"{path} has no column {', '.join(absent)}: it is damaged, or of another version. Start a new run without --resume."
+        )
+    for row in reader:
+        if None in row or None in row.values():
+            raise InvalidValue(
+                f"{path}, line {reader.line_num}: no record with the columns {', '.join(names)}. Restore the line, or start a new run "
+                "without --resume."
+            )
+        rows.append({column: row[column] for column in columns})
+    return rows
 
 
-def _whole(file: TextIO) -> int:
-    """Return the length of the complete lines of an ASCII file, and position the file there."""
-    file.seek(0)
-    length = file.read().rfind("\n") + 1
-    file.seek(length)
-    return length
+def _whole(path: Path) -> bytes:
+    """Return the complete lines of a file."""
+    content = path.read_bytes()
+    return content[: content.rfind(b"\n") + 1]
 
 
 def rounded(**values: Any) -> dict[str, Any]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import pytest
 
 from experiments.kit.run_folder import Records, Row, read_records
+from mobee.errors import InvalidValue
 
 COLUMNS = ("robot", "objects")
 
@@ -31,6 +32,30 @@ def test_a_record_that_a_kill_has_cut_is_dropped_and_the_next_is_whole(tmp_path,
     with Records(path, COLUMNS) as records:
         records.append({"robot": "icub", "objects": 30})
     assert [record["objects"] for record in read_records(path, COLUMNS)] == ["10", "30"]
+
+
+def test_records_with_any_characters_stay_whole(tmp_path):
+    path, texts = tmp_path / "records.csv", ["größer als 5 °", "two\nlines", '"quoted", and more']
+    for text in texts:
+        with Records(path, COLUMNS) as records:
+            records.append({"robot": "é", "objects": text})
+    assert read_records(path, COLUMNS) == [{"robot": "é", "objects": text} for text in texts]
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        (b"robot,objects\nicub,10\ngarbage\nicub,30\n", r"records\.csv, line 3: no record with the columns robot, objects"),
+        (b"robot,objects\nicub,10,20\n", r"records\.csv, line 2: no record"),
+        (b"robot,things\nicub,10\n", "has no column objects: it is damaged, or of another version"),
+        (b"robot,objects\n\xff\xfe,10\n", "is damaged"),
+    ],
+)
+def test_a_damaged_file_of_records_is_named(tmp_path, content, says):
+    path = tmp_path / "records.csv"
+    path.write_bytes(content)
+    with pytest.raises(InvalidValue, match=says):
+        read_records(path, COLUMNS)
 
 
 @dataclass(frozen=True, slots=True)
