@@ -146,16 +146,17 @@ def better(values: Mapping[str, ArrayLike], name: str, rivals: Sequence[str], wo
     """Judge whether the numbers of the group `name` are larger than those of every group in `rivals`; returns text and verdict.
 
     `values`: for each group, by its key, one number per run.  `worse`: judge whether they are smaller instead.  `digits`: decimals in the
-    text.  For each rival, the verdict is True if the interval of the probability of improvement lies above one half.  It is False if this
-    interval lies below one half, or if both groups are equivalent: the interval of the ratio of their means lies within 0.9 to 1.1.
-    Otherwise it is None.  The verdicts are combined by `all_hold`.
+    text.  For each rival, the verdict is False if no part of the interval of the probability of improvement is above one half, and True if
+    no part is below one half.  Otherwise it is False if both groups are equivalent (the interval of the ratio of their means lies within
+    0.9 to 1.1), else None.  The verdicts are combined by `all_hold`.
     """
     parts, verdicts = [f"{name} {estimate(values[name], digits)}"], list[bool | None]()
     for rival in rivals:
         first, second = (values[rival], values[name]) if worse else (values[name], values[rival])
         chance, (low, high) = probability_of_improvement(first, second), improvement_interval(first, second, LEVEL)
         parts.append(f"{rival} {estimate(values[rival], digits)} (P {chance:.2f} [{low:.2f}, {high:.2f}])")
-        decided = decides(improvement_interval(first, second), least=0.5)
+        span = improvement_interval(first, second)
+        decided = False if span[1] <= 0.5 else decides(span, least=0.5)  # groups with the same values have the interval [0.5, 0.5]
         verdicts.append(False if decided is None and _about_equal(first, second) else decided)
     return ", ".join(parts), all_hold(verdicts)
 

@@ -158,6 +158,15 @@ def test_the_intervals_decide_whether_one_is_better():
     assert better(many, "c", ("a",), worse=True)[1] is True and better(many, "a", ("c",))[1] is True
 
 
+@pytest.mark.parametrize(
+    ("first", "second", "verdict"),
+    [([1.0] * 9, [1.0] * 9, False), ([0.0] * 9, [0.0] * 9, False), ([0.0] * 8 + [2.0], [0.0] * 8 + [1.0], None), ([2.0], [0.0], True)],
+)
+def test_a_group_is_not_better_than_one_with_the_same_values(first, second, verdict):
+    assert better({"a": first, "b": second}, "a", ("b",))[1] is verdict
+    assert better({"a": second, "b": first}, "a", ("b",), worse=True)[1] is verdict
+
+
 @pytest.mark.parametrize(("given", "wanted"), [((True, True), True), ((True, None), None), ((None, False), False)])
 def test_all_hold_if_none_is_open_or_fails(given, wanted):
     assert all_hold(given) is wanted
