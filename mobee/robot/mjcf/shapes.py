@@ -154,7 +154,8 @@ def _color(compiled: Compiled, geom: int) -> Channels:
         count = int(model.tex_height[textures[0]] * model.tex_width[textures[0]]) * channels
         mean = model.tex_data[start : start + count].reshape(-1, channels)[:, :3].mean(axis=0) / 255.0
         red, green, blue = (np.array([red, green, blue]) * mean).tolist()
-    return round(float(red), 4), round(float(green), 4), round(float(blue), 4), round(float(opacity), 4)
+    red, green, blue, opacity = np.clip([red, green, blue, opacity], 0.0, 1.0).round(4).tolist()  # MuJoCo accepts other numbers
+    return red, green, blue, opacity
 
 
 def read_cameras(compiled: Compiled, link_of: list[int]) -> dict[str, Camera]:

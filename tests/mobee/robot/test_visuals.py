@@ -80,7 +80,7 @@ MJCF = """
   <geom name="hidden" type="sphere" size=".1" contype="0" conaffinity="0" group="4"/>
   <geom name="clear" type="sphere" size=".1" contype="0" conaffinity="0" rgba="1 0 0 0"/>
   <body name="tip" pos="0 0 .5"><joint name="nod" axis="0 1 0" range="-1 1"/>
-   <geom name="ball" type="ellipsoid" size=".1 .2 .3" rgba="0 1 0 1" material="gold"/>
+   <geom name="ball" type="ellipsoid" size=".1 .2 .3" rgba="0 255 0 1" material="gold"/>
    <camera name="wrist" pos="0 0 .1" euler="90 0 0"/>
   </body>
  </body>
@@ -100,7 +100,7 @@ def test_an_mjcf_draws_geoms_that_cannot_collide_or_else_all(toy: Robot) -> None
     assert [toy.links[visual.link] for visual in toy.visuals] == ["arm", "tip"]
     assert skin.mesh is not None and (skin.kind, skin.mesh.file, skin.mesh.name) == ("mesh", "toy.xml", "wedge")
     assert (ball.kind, ball.size) == ("ellipsoid", (0.1, 0.2, 0.3))
-    assert (skin.color, ball.color) == ((1.0, 0.8, 0.0, 1.0), (0.0, 1.0, 0.0, 1.0))  # of the material, unless the geom has its own
+    assert (skin.color, ball.color) == ((1.0, 0.8, 0.0, 1.0), (0.0, 1.0, 0.0, 1.0))  # of the material, unless the geom has its own; 0 to 1
 
 
 def test_an_mjcf_has_the_cameras_that_are_fixed_to_a_body(toy: Robot) -> None:
