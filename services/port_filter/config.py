@@ -9,6 +9,8 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from mobee.control.reflex import ReflexSettings
+from mobee.errors import InvalidValue
+from mobee.robot.robot import Robot
 from services.common.config import WorldConfig
 
 _SETTINGS = ReflexSettings()
@@ -24,7 +26,7 @@ class Config(WorldConfig, frozen=True, kw_only=True):
 
     clients: Annotated[str, Meta(pattern="^[a-z0-9_]+$")] = "icub_filtered"
     """Namespace (first part of all keys) in which the filter's clients find the robot."""
-    participants: list[str] = []
+    participants: list[Annotated[str, Meta(pattern="^[a-z0-9_]+$")]] = []
     """In lockstep: names of the clients whose answers every tick waits for."""
     contacts: Literal["solid", "field", "both"] = "both"
     """Kinds of contact that start the reflex. solid: contacts of solid shapes; field: contacts of the larger volumes around them; both:
@@ -50,6 +52,14 @@ class Config(WorldConfig, frozen=True, kw_only=True):
     waypoint, as in thesis 4.1."""
     ttl: Annotated[int, Meta(ge=20, le=200)] = 100
     """Lifetime of the reflex's commands [ms]: robot_sim holds a part if no new command arrives within this time."""
+
+    def check_robot(self, robot: Robot) -> None:
+        """Raise InvalidValue if the clients would find the filter where the robot itself is, or if a part's name cannot be used."""
+        super().check_robot(robot)
+        if self.clients == self.namespace:
+            raise InvalidValue(
+                f'clients = "{self.clients}" is the namespace of the robot itself: give another one, such as "{self.namespace}_filtered".'
+            )
 
     @property
     def reflex(self) -> ReflexSettings:
