@@ -37,7 +37,7 @@ class Config(WorldConfig, frozen=True, kw_only=True):
     delay, backlash, friction and encoder_noise (docs/plant.md)."""
     lag: NotNegative = 0.05
     """Time constant of the motors, s."""
-    delay: NotNegative = 0.02
+    delay: Annotated[float, Meta(ge=0, le=10)] = 0.02
     """Time from a command to its first effect on the motor, s."""
     backlash: NotNegative = math.radians(0.2)
     """Play between motor and joint, rad."""
@@ -51,7 +51,7 @@ class Config(WorldConfig, frozen=True, kw_only=True):
     encoder_errors: Mapping[str, float] = {}
     """Constant errors of encoders (reading minus true position), rad, or m for motors that slide, by motor, as { r_elbow = 0.05 }: the
     robot is miscalibrated. Motors that are not named have no error."""
-    substep: Annotated[float, Meta(gt=0)] = 0.005
+    substep: Annotated[float, Meta(ge=1e-5)] = 0.005
     """Longest time step of motors and physics, s."""
     jitter: Annotated[float, Meta(ge=0, le=0.1)] = 0.02
     """Standard deviation of a part's sampling time, as a share of a tick."""

@@ -12,6 +12,7 @@ from mobee.errors import InvalidValue, UnknownName
 from mobee.model.world_file import WORLDS
 from mobee.robot.load import load_robot
 from mobee.simulation.motors import MotorParameters
+from services.common.config import load_config
 from services.robot_sim.config import Config
 from services.robot_sim.make import make_backend
 
@@ -39,6 +40,13 @@ def test_a_robot_whose_motors_were_not_identified_is_refused() -> None:
 def test_encoder_errors_are_finite_errors_of_motors(errors: dict[str, float], error: type[Exception], text: str) -> None:
     with pytest.raises(error, match=text):
         Config(backend="kinematic", encoder_errors=errors).check_robot(load_robot("icub"))
+
+
+@pytest.mark.parametrize("flags", [("--delay", "1e9"), ("--substep", "1e-300")])  # arrays of terabytes, or of a negative size
+def test_steps_and_delays_that_no_memory_holds_are_refused(flags: tuple[str, str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        load_config(Config, flags, "services.robot_sim")
+    assert flags[0].strip("-") in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("name", ["kinematic", "pybullet", "mujoco"])
