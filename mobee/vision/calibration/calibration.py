@@ -182,8 +182,11 @@ def _read(plain: Mapping[str, Any]) -> Calibration:
     parameters = plain["parameters"]
     x, prior = (np.array([one[field] for one in parameters.values()], dtype=np.float64) for field in ("value", "prior"))
     covariance = np.array(plain["covariance"], dtype=np.float64)
-    if covariance.shape != (len(x), len(x)) or not (np.isfinite(x).all() and np.isfinite(covariance).all()):
+    if covariance.shape != (len(x), len(x)) or not all(np.isfinite(one).all() for one in (x, prior, covariance)):
         raise ValueError(f"{len(x)} parameters with a covariance of shape {covariance.shape}; all must be finite")
+    variance = np.diag(covariance)
+    if not ((variance >= 0.0).all() and (np.abs(covariance - covariance.T) <= 1e-3 * np.sqrt(np.outer(variance, variance))).all()):
+        raise ValueError("a covariance that is not symmetric, or has a variance below 0")
     return Calibration(
         robot=str(plain["robot"]),
         cameras=tuple(plain["cameras"]),

@@ -93,7 +93,8 @@ def calibrate(rig: Rig, observations: Sequence[Observation], settings: CameraSet
     """Estimate the errors of the mounts (poses of cameras and tag on their links), the head's encoders, and the latency of pictures.
 
     The residuals of a picture are weighted by their covariance: noise of the corners, and noise of the encoders and of the stamp (the time
-    of the picture), which moves all corners of a picture together.  The prior follows from the tolerances in `settings`.  Loss: soft L1.
+    of the picture), which moves all corners of a picture together.  The prior follows from the tolerances in `settings`; where a tolerance
+    is 0, the error is 0.  Loss: soft L1.
 
     Args:
         rig: the robot, its cameras at the positions of the model, and the tag.
@@ -102,11 +103,14 @@ def calibrate(rig: Rig, observations: Sequence[Observation], settings: CameraSet
         corner_noise: standard deviation of a measured corner along column and row, px.
 
     Raises:
-        InvalidValue: there are fewer than 8 pictures, or the rig has no tag.
+        InvalidValue: fewer than 8 pictures show the tag, the rig has no tag, or the noise is not above 0.
     """
-    if len(observations) < FEWEST:
-        raise InvalidValue(f"{len(observations)} pictures show the tag: at least {FEWEST} are needed. Use more postures, or a larger tag.")
+    if not 0.0 < corner_noise < np.inf:
+        raise InvalidValue(f"corner_noise {corner_noise} px: must be a finite number above 0")
     problem, scale = _Problem.of(rig, observations), rig.deviations(settings.deviations)
+    pictures = int(problem.seen.any(axis=1).sum())
+    if pictures < FEWEST:
+        raise InvalidValue(f"{pictures} pictures show the tag: at least {FEWEST} are needed. Use more postures, or a larger tag.")
     solve = _Solver(problem, scale, corner_noise, settings.jitter)
     x: Array = np.zeros(len(scale))
     for _ in range(ROUNDS):
@@ -118,13 +122,13 @@ def calibrate(rig: Rig, observations: Sequence[Observation], settings: CameraSet
     misfit = float((whitened[problem.seen] ** 2).mean())
     covariance = scale[:, None] * (max(1.0, misfit) * inverse) * scale
     before, after = (_quality(rig, problem, observations, one) for one in (np.zeros(len(x)), x))
-    hidden = _unobservable(rig, slopes.reshape(-1, len(x)) * scale)
+    hidden = _unobservable(rig, slopes.reshape(-1, len(x)) * scale, np.flatnonzero(scale))
     return Calibration(
         robot=rig.robot.name,
         cameras=tuple(rig.cameras),
         lens=rig.lens,
         tag=problem.tag,
-        pictures=len(observations),
+        pictures=pictures,
         names=rig.names,
         x=x,
         covariance=covariance,
@@ -164,7 +168,8 @@ class _Solver:
             return newest[0][1:]
 
         function: Callable[[Array], Array] = lambda y: at(y)[0]  # noqa: E731
-        found = least_squares(function, start / self._scale, jac=lambda y: at(y)[1], loss="soft_l1", f_scale=ROBUST, method="trf")
+        scaled = start / np.where(self._scale > 0.0, self._scale, 1.0)
+        found = least_squares(function, scaled, jac=lambda y: at(y)[1], loss="soft_l1", f_scale=ROBUST, method="trf")
         return self._scale * found.x, np.asarray(found.jac)
 
     def whitened(self, residuals: Array, derivatives: Array) -> tuple[Array, Array]:
@@ -180,17 +185,19 @@ class _Solver:
         self._roots = np.asarray(np.linalg.cholesky(total), dtype=np.float64)
 
 
-def _unobservable(rig: Rig, slopes: Array) -> tuple[Unobservable, ...]:
+def _unobservable(rig: Rig, slopes: Array, unknown: Ints) -> tuple[Unobservable, ...]:
     """Return the directions of the parameters about which the pictures say almost nothing, from slopes (rows, P) in prior deviations.
 
-    A direction of unit length with singular value s is known to 1 / sqrt(1 + s^2) of its prior deviation.
+    A direction of unit length with singular value s is known to 1 / sqrt(1 + s^2) of its prior deviation. `unknown`: indices of the
+    parameters whose prior deviation is not 0.
     """
-    _, values, directions = np.linalg.svd(slopes, full_matrices=False)
+    _, values, directions = np.linalg.svd(slopes[:, unknown], full_matrices=False)
     found = []
     for value, direction in zip(values, directions, strict=True):
         if value**2 / (1.0 + value**2) < NULL:
             order = np.argsort(-np.abs(direction))
-            named = {rig.names[k]: round(float(direction[k]), 3) for k in order if abs(direction[k]) >= NAMED * abs(direction[order[0]])}
+            large = [k for k in order if abs(direction[k]) >= NAMED * abs(direction[order[0]])]
+            named = {rig.names[unknown[k]]: round(float(direction[k]), 3) for k in large}
             found.append(Unobservable(float(value), named))
     return tuple(found)
 

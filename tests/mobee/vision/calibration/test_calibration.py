@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -103,9 +104,38 @@ def test_the_file_holds_the_whole_result(found: Calibration, tmp_path: Path) -> 
         load_calibration(tmp_path / "eyes.json")
 
 
-def test_too_few_pictures_are_refused() -> None:
-    with pytest.raises(InvalidValue, match="at least 8"):
-        calibrate(RIG, observations(TRUE, seed=5)[:5], SETTINGS)
+def test_a_tolerance_of_0_means_no_error() -> None:
+    """Without offsets of encoders, everything else is observable."""
+    x = TRUE.copy()
+    x[RIG.where("encoder")] = 0.0
+    exact = calibrate(RIG, observations(x, seed=5), replace(SETTINGS, encoder_offset=0.0))
+    assert not exact.x[RIG.where("encoder")].any() and not exact.deviations[RIG.where("encoder")].any()
+    unknown = np.flatnonzero(exact.prior)
+    error = (exact.x - x)[unknown]
+    assert error @ np.linalg.solve(exact.covariance[np.ix_(unknown, unknown)], error) < chi2.ppf(0.999, len(error))
+    assert exact.misfit == pytest.approx(1.0, abs=0.15) and exact.unobservable == ()
+
+
+def test_too_few_pictures_of_the_tag_are_refused() -> None:
+    seen = observations(TRUE, seed=5)
+    for few in (seen[:5], seen[:5] + [replace(one, corners={}) for one in seen[5:]]):
+        with pytest.raises(InvalidValue, match="5 pictures show the tag: at least 8"):
+            calibrate(RIG, few, SETTINGS)
+    with pytest.raises(InvalidValue, match="corner_noise -1"):
+        calibrate(RIG, seen, SETTINGS, corner_noise=-1.0)
+
+
+@pytest.mark.parametrize("change", ["prior", "variance", "symmetry"])
+def test_a_damaged_file_is_refused(found: Calibration, tmp_path: Path, change: str) -> None:
+    path = found.save(tmp_path / "eyes.json")
+    plain = json.loads(path.read_text())
+    if change == "prior":
+        plain["parameters"]["latency"]["prior"] = float("nan")
+    else:
+        plain["covariance"][0][0 if change == "variance" else 1] = -1.0
+    path.write_text(json.dumps(plain))
+    with pytest.raises(InvalidValue, match="damaged calibration"):
+        load_calibration(path)
 
 
 def test_errors_are_drawn_within_the_tolerances_and_by_the_seed() -> None:
