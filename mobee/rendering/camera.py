@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mobee._core.rays import Rays, cast
 from mobee.arrays import Array
-from mobee.errors import UnknownName
+from mobee.errors import InvalidValue, UnknownName
 from mobee.rendering.solid import Solid, packed
 
 Floats = NDArray[np.float32]
@@ -83,12 +83,14 @@ def camera_axes(view: str | tuple[float, float]) -> Array:
     """Return the axes of a camera, (3, 3), rows right, up and ahead, for a view.
 
     `view`: a name in VIEWS, or azimuth and elevation [degrees]; azimuth 0 is in front of a robot that looks along -x, as the iCub does, and
-    90 is at its right. Raises UnknownName for an unknown name.
+    90 is at its right. Raises UnknownName for an unknown name, InvalidValue for other angles.
     """
     if isinstance(view, str):
         if view not in VIEWS:
             raise UnknownName("view", view, VIEWS)
         view = VIEWS[view]
+    if np.shape(view) != (2,) or not np.isfinite(view).all():
+        raise InvalidValue(f"view {view!r}: must be azimuth and elevation, two finite numbers [degrees], or one of {', '.join(VIEWS)}.")
     a, e = np.deg2rad(view)
     ahead = np.array([np.cos(a) * np.cos(e), -np.sin(a) * np.cos(e), -np.sin(e)])
     right = np.array([-np.sin(a), -np.cos(a), 0.0])

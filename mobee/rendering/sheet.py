@@ -27,6 +27,7 @@ from mobee.model.world_object import WorldObject
 from mobee.rendering.camera import camera_axes, framing
 from mobee.rendering.picture import Picture, draw
 from mobee.rendering.solid import Color, Solid, ball, focus, lowest, object_solids, robot_solids, trail_solids
+from mobee.robot.writing import write_whole
 from mobee.simulation.plant import OfflinePlant
 
 View = str | tuple[float, float]
@@ -205,6 +206,8 @@ def pictures_of(scenes: Sequence[Sequence[Solid]], view: View, height: int) -> l
     The camera's frame contains the solids of all scenes except those that may lie outside (`Solid.aside`). `view`: name of `camera.VIEWS`,
     or (azimuth, elevation) in degrees. `height`: height of each picture in pixels.
     """
+    if height < 1:
+        raise InvalidValue(f"height {height!r}: must be at least 1 pixel.")
     about = [solid for scene in scenes for solid in focus(scene)]
     camera = framing(camera_axes(view), about, np.empty((0, 3)), height)
     floor = min(lowest(scene) for scene in scenes)
@@ -240,12 +243,14 @@ def marker_cloud(
         NotInstalled: Matplotlib is not installed.
     """
     pose, names = model.evaluate(np.atleast_2d(np.asarray(q, dtype=np.float64))), [markers] if isinstance(markers, str) else list(markers)
-    if not names or not len(pose.q):
-        raise InvalidValue(f"{len(pose.q)} poses and {len(names)} markers: must be at least one of each")
+    if not names or not len(pose.q) or not views:
+        raise InvalidValue(f"{len(pose.q)} poses, {len(names)} markers and {len(views)} views: must be at least one of each")
     places = np.concatenate([pose.position(name) for name in names])
     given = pose.position(names[0])[:, 2] if values is None else np.asarray(values, dtype=np.float64)
     if given.shape != pose.q.shape[:1]:
         raise InvalidValue(f"{len(pose.q)} poses and values of shape {given.shape}: must be one value per pose")
+    if not np.isfinite(given).all():
+        raise InvalidValue(f"values: {int((~np.isfinite(given)).sum())} of {len(given)} are not finite; a colour needs a finite number")
     colored = places[:, 2] if values is None else np.tile(given, len(names))
     scene = cloud_solids(model.evaluate(model.robot.home if shown is None else shown), places, colored)
     row = [Panel(pictures_of([scene], view, height)[0], view if isinstance(view, str) else "") for view in views]
@@ -267,8 +272,11 @@ def cloud_solids(pose: Pose, places: Array, values: Array) -> list[Solid]:
 def write_sheet(rows: Sequence[tuple[str, Sequence[Panel]]], path: Path, colors: int = 256) -> Path:
     """Write rows of pictures to a PNG file, and return its path; a row is a title and its panels from left to right.
 
-    `colors`: largest number of colours in the file. Raises NotInstalled without Matplotlib.
+    `colors`: largest number of colours in the file, 1 to 256. A file of this name is replaced when the whole picture is drawn. Raises
+    InvalidValue for another number of colours, OSError if the file cannot be written, and NotInstalled without Matplotlib.
     """
+    if not 1 <= colors <= 256:
+        raise InvalidValue(f"colors {colors!r}: must be 1 to 256.")
     columns = [max(one.picture.shape[1] for one in column if one) for column in zip_longest(*(panels for _, panels in rows))]
     heights = [_row_height(title, panels) for title, panels in rows]
     width, height = sum(columns) + GAP * (len(columns) - 1) + 2 * MARGIN, sum(heights) + GAP * (len(rows) - 1) + 2 * MARGIN
@@ -278,12 +286,13 @@ def write_sheet(rows: Sequence[tuple[str, Sequence[Panel]]], path: Path, colors:
     for (title, panels), row_height in zip(rows, heights, strict=True):
         left, below = MARGIN, top + (TITLE_HEIGHT if title else 0)
         if title:
-            figure.text(left / width, 1.0 - (top + 0.5 * TITLE_HEIGHT) / height, title, fontsize=11, fontweight="bold", va="center")
+            place = left / width, 1.0 - (top + 0.5 * TITLE_HEIGHT) / height
+            figure.text(*place, title, fontsize=11, fontweight="bold", va="center", parse_math=False)
         for panel, column_width in zip(panels, columns, strict=False):
             (high, narrow), start = panel.picture.shape[:2], left + (column_width - panel.picture.shape[1]) // 2
             sheet[below : below + high, start : start + narrow] = panel.picture
             middle = (left + 0.5 * column_width) / width, 1.0 - (below + high + 0.5 * CAPTION_HEIGHT) / height
-            figure.text(*middle, panel.caption, fontsize=10, color="0.25", ha="center", va="center")
+            figure.text(*middle, panel.caption, fontsize=10, color="0.25", ha="center", va="center", parse_math=False)
             left += column_width + GAP
         top += row_height + GAP
     figure.figimage(sheet, zorder=-1)
@@ -327,7 +336,9 @@ def _write_png(figure: Any, path: Path, colors: int) -> None:
     chosen[(pixels == 255).all(axis=2)] = white
     found = Image.fromarray(chosen)
     found.putpalette(entries.ravel().tolist())
-    found.save(path, optimize=True)
+    whole = io.BytesIO()
+    found.save(whole, "PNG", optimize=True)
+    write_whole(Path(path), whole.getvalue())
 
 
 def _time_caption(motion: Motion, moment: int) -> str:

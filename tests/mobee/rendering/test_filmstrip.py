@@ -112,6 +112,27 @@ def test_a_filmstrip_is_written_as_one_picture(motion: Motion, tmp_path: Path) -
     assert (np.ptp(pixels.astype(int), axis=2) > 60).any()  # the trail and the arm are in colour
 
 
+def test_a_picture_stays_whole_if_the_next_one_cannot_be_written(motion: Motion, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("matplotlib")
+    from PIL import Image
+
+    strips, path = [Strip(motion.part(0, 1), PALM, poses=1, title=r"titles are plain: $\frac$, $5")], tmp_path / "film.png"
+    before = filmstrip(strips, path, height=20).read_bytes()
+    save = Image.Image.save
+
+    def full(self: Image.Image, file: object, *given: object, **options: object) -> None:
+        if "optimize" in options:
+            file = path.open("wb") if file == path else file  # as Pillow does for a name
+            file.write(b"half")
+            raise OSError(28, "No space left on device")
+        save(self, file, *given, **options)
+
+    monkeypatch.setattr(Image.Image, "save", full)
+    with pytest.raises(OSError, match="No space left"):
+        filmstrip(strips, path, height=20)
+    assert path.read_bytes() == before and list(tmp_path.iterdir()) == [path]
+
+
 def test_a_cloud_has_a_point_where_the_marker_is_in_each_pose_coloured_by_its_value(motion: Motion, model: mobee.Model) -> None:
     places = motion.path(PALM)[:3]
     points = [solid for solid in cloud_solids(motion.poses[0], places, np.array([0.0, 1.0, 0.0])) if solid.group == -3]
@@ -125,6 +146,10 @@ def test_a_cloud_is_written_and_needs_one_value_per_pose(model: mobee.Model, tmp
     assert marker_cloud(model, q, PALM, tmp_path / "cloud.png", views=("top",), height=30).stat().st_size > 0
     with pytest.raises(InvalidValue, match="one value per pose"):
         marker_cloud(model, q, PALM, tmp_path / "cloud.png", values=[1.0])
+    with pytest.raises(InvalidValue, match="1 of 4 are not finite"):
+        marker_cloud(model, q, PALM, tmp_path / "cloud.png", values=[1.0, 2.0, np.nan, 3.0])
+    with pytest.raises(InvalidValue, match="0 views"):
+        marker_cloud(model, q, PALM, tmp_path / "cloud.png", views=())
 
 
 def test_mistakes_are_refused(motion: Motion, tmp_path: Path) -> None:
@@ -132,5 +157,11 @@ def test_mistakes_are_refused(motion: Motion, tmp_path: Path) -> None:
         panels(Strip(motion, PALM, poses=0), 40)
     with pytest.raises(UnknownName):
         panels(Strip(motion, "rigth_palm"), 40)
+    with pytest.raises(InvalidValue, match="height 0"):
+        panels(Strip(motion, PALM), 0)
+    with pytest.raises(InvalidValue, match="two finite numbers"):
+        panels(Strip(motion, PALM, views=((np.nan, 0.0),)), 40)
+    with pytest.raises(InvalidValue, match="colors 257"):
+        filmstrip([Strip(motion.part(0, 0), PALM)], tmp_path / "film.png", 20, colors=257)
     with pytest.raises(InvalidValue, match="as many of each"):
         Motion(motion.poses, motion.times[:3], motion.objects)
