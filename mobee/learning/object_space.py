@@ -33,10 +33,12 @@ class ObjectSpace(Space):
         name: name of the object, under which the plant perceives it.
 
     Raises:
-        InvalidValue: there are too many states; the message states the largest number.
+        InvalidValue: there are too many states, and the message states the largest number; or `postures` is an `ObjectSpace`.
     """
 
     def __init__(self, postures: Space, grid: Grid, name: str) -> None:
+        if isinstance(postures, ObjectSpace):
+            raise InvalidValue(f"{postures} holds the cell of {postures.name} already: the states can hold the cell of one object only.")
         count = len(postures) * len(grid)
         if count > MAX_STATES:
             raise InvalidValue(f"{len(postures)} postures x {len(grid)} cells make {count} states; the limit is {MAX_STATES}.")
@@ -122,14 +124,15 @@ class Grid:
     """
 
     def __init__(self, x: tuple[float, float], y: tuple[float, float], shape: tuple[int, int], margin: float = MARGIN) -> None:
-        low, high = np.array([x, y], dtype=np.float64).T
-        if not (np.isfinite([low, high]).all() and (low < high).all()):
+        ranges, sizes = real_array("x and y of the grid", [x, y]), np.asarray(shape)
+        if ranges.shape != (2, 2) or not (np.isfinite(ranges).all() and (ranges[:, 0] < ranges[:, 1]).all()):
             raise InvalidValue(f"x={x!r}, y={y!r}: give lowest and highest value of each, in m.")
-        if len(shape) != 2 or any(isinstance(one, bool) or not isinstance(one, int) or one < 1 for one in shape) or max(shape) < 2:
+        if sizes.shape != (2,) or sizes.dtype.kind not in "iu" or sizes.min() < 1 or sizes.max() < 2:
             raise InvalidValue(f"shape={shape!r}: give the number of cells along x and along y, two cells or more in total.")
-        self.shape: tuple[int, int] = (shape[0], shape[1])
-        self._low, self._size = low, (high - low) / np.array(shape)
-        if not 0.0 <= margin < 0.5 * self._size.min():
+        low, high = ranges.T
+        self.shape: tuple[int, int] = (int(sizes[0]), int(sizes[1]))
+        self._low, self._size = low, (high - low) / sizes
+        if not (isinstance(margin, int | float | np.number) and 0.0 <= margin < 0.5 * self._size.min()):
             raise InvalidValue(f"margin={margin!r} m: give 0 or more, below {0.5 * self._size.min():.4g} m, half of a cell.")
         self.margin = float(margin)
         self._range = (tuple(map(float, x)), tuple(map(float, y)))

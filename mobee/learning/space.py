@@ -239,8 +239,10 @@ def pruned(space: Space, transitions: Sequence[Transition], seen: int = MIN_ATTE
     """Return the space without unreachable states, and the new number of each state, (S,), -1 for a removed state.
 
     A state is unreachable if it was the goal of at least `seen` of the transitions, and no transition started or ended in it. States whose
-    actions all lead to removed states are removed too. Raises InvalidValue if fewer than two states would remain.
+    actions all lead to removed states are removed too. Raises InvalidValue if fewer than two states would remain, or for a space whose
+    states are not poses alone.
     """
+    _require_poses(space)
     aimed, reached = np.zeros(len(space), dtype=int), np.zeros(len(space), dtype=bool)
     for made in transitions:
         aimed[space.goal(made.s, made.a)] += 1
@@ -266,8 +268,10 @@ def with_shortcuts(space: Space, transitions: Sequence[Transition], count: int, 
 
     `transitions`: the transitions of an agent, in order; consecutive ones form a path, from which loops are removed. `count`: number of
     pairs of states that get a shortcut in both directions: the pairs that occurred most often on the path and have no action yet. `span`:
-    largest number of transitions on the path between the two states of a pair.
+    largest number of transitions on the path between the two states of a pair. Raises InvalidValue for a space whose states are not poses
+    alone.
     """
+    _require_poses(space)
     known = set(edges_of(space.goals))
     path: list[int] = []
     passed: Counter[tuple[int, int]] = Counter()
@@ -281,6 +285,12 @@ def with_shortcuts(space: Space, transitions: Sequence[Transition], count: int, 
     best = sorted(passed, key=lambda pair: (-passed[pair], pair))[:count]
     edges = joined([*known, *best, *((goal, state) for state, goal in best)])
     return Space(space.robot, space.joints, space.samples, table_of(edges, len(space)), space.rest)
+
+
+def _require_poses(space: Space) -> None:
+    """Raise InvalidValue for an `ObjectSpace` or a `DiscreteSpace`: a `Space` has only samples and goals, and would lose the rest."""
+    if type(space).state_after is not Space.state_after or type(space).aim is not Space.aim:
+        raise InvalidValue(f"{space}: its states are not poses alone, so it cannot be adapted; of an ObjectSpace give `space.postures`.")
 
 
 def carried(transitions: Sequence[Transition], old: Space, new: Space) -> list[Transition]:

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -38,6 +40,11 @@ def test_the_cell_changes_beyond_the_margin() -> None:
     ("change", "message"),
     [
         ({"x": (0.1, 0.1)}, "lowest and highest"),
+        ({"x": (0.1,)}, "x and y of the grid is"),
+        ({"x": (0.0, 0.1, 0.2), "y": (0.0, 0.1, 0.2)}, "lowest and highest"),
+        ({"x": "ab"}, "x and y of the grid is"),
+        ({"shape": 3}, "number of cells"),
+        ({"margin": "none"}, "margin='none'"),
         ({"y": (0.0, np.inf)}, "lowest and highest"),
         ({"shape": (1, 1)}, "two cells or more"),
         ({"shape": (0, 3)}, "two cells or more"),
@@ -48,6 +55,11 @@ def test_the_cell_changes_beyond_the_margin() -> None:
 def test_arguments_that_do_not_fit_are_refused(change, message) -> None:
     with pytest.raises(InvalidValue, match=message):
         Grid(**({"x": (0.0, 0.3), "y": (0.0, 0.3), "shape": (3, 3)} | change))
+
+
+def test_numbers_of_numpy_make_the_same_grid_as_plain_ones() -> None:
+    made = Grid(np.array([-0.4, -0.1]), np.array([0.0, 0.4]), np.array([3, 2]), margin=np.float64(0.02))  # type: ignore[arg-type]
+    assert json.dumps(made.settings) == json.dumps(GRID.settings)
 
 
 @pytest.mark.parametrize("place", [(np.nan, 0.0), (0.0,), "here"])

@@ -10,9 +10,11 @@ import pytest
 from mobee import CuriousAgent, Grid, ObjectSpace, PerceivingPlant, Planner
 from mobee.arrays import Array
 from mobee.errors import InvalidValue, MobeeError
+from mobee.learning.discrete import DiscreteSpace
 from mobee.learning.explorers import EXPLORERS
 from mobee.learning.lattice import Lattice, plane_layout
 from mobee.learning.record import load_learned, space_from
+from mobee.learning.space import Space, pruned, with_shortcuts
 from mobee.plant import Outcome
 from mobee.store import TransitionStore
 from tests.mobee.learning.toys import InstantPlant, toy_robot
@@ -126,6 +128,18 @@ def test_it_is_drawn_as_a_block_of_postures_in_each_cell() -> None:
     assert len(np.unique(drawn.round(6), axis=0)) == len(made)
     assert np.ptp(drawn[made.in_cell(0)], axis=0).tolist() == np.ptp(drawn[made.in_cell(3)], axis=0).tolist() == [2.0, 0.0]
     assert (np.diff([drawn[made.in_cell(cell), 0].mean() for cell in range(4)]) > 2.0).all()
+
+
+def test_the_cells_of_two_objects_are_refused() -> None:
+    with pytest.raises(InvalidValue, match="of one object only"):
+        ObjectSpace(space(), LINE, "ball")
+
+
+@pytest.mark.parametrize("given", [space(), DiscreteSpace(3, 2)])
+def test_a_space_whose_states_are_no_poses_alone_is_not_adapted(given: Space) -> None:
+    for adapted in (lambda: pruned(given, []), lambda: with_shortcuts(given, [], 1)):
+        with pytest.raises(InvalidValue, match="its states are not poses alone"):
+            adapted()
 
 
 def test_too_many_states_are_refused() -> None:
