@@ -79,6 +79,15 @@ def test_a_library_from_another_folder_is_refused(toys: tuple[Checkout, Checkout
         measure_checkouts(*toys, ["edges"], rounds=1)
 
 
+def test_the_folder_above_a_checkout_is_refused(toys: tuple[Checkout, Checkout], monkeypatch: pytest.MonkeyPatch) -> None:
+    """An installed MoBeE can lie below it; here the path of Python's modules stands for the installation."""
+    start = subprocess.Popen
+    environment = {"PYTHONPATH": str(toys[0].folder)}
+    monkeypatch.setattr(subprocess, "Popen", lambda argv, **given: start(argv, **given | {"env": given["env"] | environment}))
+    with pytest.raises(AgainstFailed, match=r"library was taken from .*old/mobee/__init__\.py, not from"):
+        measure_checkouts(Checkout(toys[0].folder.parent), toys[0], ["edges"], rounds=1)
+
+
 def test_a_commit_is_checked_out_temporarily_and_a_folder_is_used_as_it_is(tmp_path: Path) -> None:
     with checkout(str(tmp_path)) as found:
         assert found == Checkout(tmp_path.resolve(), sys.executable)
