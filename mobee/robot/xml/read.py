@@ -295,6 +295,9 @@ def _read_joint(node: Node, draft: Draft, place: Place) -> Place:
     motor = node.optional("motor") or place.motor or node.missing("motor")
     name = node.optional("name") or (motor if all(motor != used for _, used in draft.drives) else f"{motor}_{index}")
     link = node.optional("moves") or name
+    if link == draft.links[0]:
+        remedy = 'Name another link with moves="..." in the joint, or give the base another name: <link name="...">, outside of every joint'
+        node.fail("moves", f"link {link!r} has the name of the base", remedy)
     if link in draft.links or any(name == joint.name for joint in draft.joints):
         node.fail("name", f"a second joint {name!r} or link {link!r}", "Give every joint its own name and every link it moves another")
     draft.joints.append(Joint(name, place.link, "revolute" if kind == "revolute" else "prismatic", axis, place.point, np.zeros(2)))

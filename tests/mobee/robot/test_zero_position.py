@@ -220,6 +220,10 @@ BAD = {
     "stiff joint": ('<joint name="j" motor="pan" z="1" minPos="3" maxPos="3"/>', "<joint> minPos: equals maxPos 3"),
     "second motor": (MOTOR, "<motor> name: a second motor 'pan'. The first is in line 3"),
     "second joint": ('<joint name="pan" motor="pan" z="1"/>', "<joint> name: a second joint 'pan'"),
+    "name of the base": (
+        '<motor name="base" minPos="0" maxPos="1"><joint z="1"/></motor>',
+        "<joint> moves: link 'base' has the name of the base. Name another link with moves=",
+    ),
     "second shape": ('<sphere name="s" radius="1"/><sphere name="s" radius="1"/>', "<sphere> name: a second shape 's'"),
     "second marker": ('<marker name="m"/><marker name="m"/>', "<marker> name: a second marker 'm'"),
     "no flag": ('<sphere radius="1" field="maybe"/>', "<sphere> field: 'maybe' is neither true nor false"),
