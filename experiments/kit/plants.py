@@ -19,8 +19,7 @@ from mobee.behaviours.bump import BumpWatch
 from mobee.behaviours.pick import BACK, CALM, Followed, Forces
 from mobee.control import SettleTest
 from mobee.control.gains import Verdict
-from mobee.model.contact import touched_by
-from mobee.model.pose import Pose
+from mobee.model.pose import Pose, touched_by
 from mobee.model.world_object import WorldObject
 from mobee.plant import Outcome
 from mobee.reach import ReachOutcome, ReachPlant, ReachTarget

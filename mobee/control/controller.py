@@ -15,7 +15,7 @@ from mobee.arrays import Array
 from mobee.control.forces import Forces, Propagate, State, Term, checked, checked_force, forces_of, valid_terms
 from mobee.control.gains import Gains
 from mobee.control.law import Command, Law, Modality, largest_step, require_stable
-from mobee.control.reach import Reaches
+from mobee.control.reach_forces import ReachForces
 from mobee.errors import InvalidValue, UnknownName
 from mobee.model.engine import MAX_HANDS
 from mobee.model.masses import gravity_torque
@@ -99,7 +99,7 @@ class Controller:
         self.terms = valid_terms(terms)
         self.force_names = (*term_names(), *(term.name for term in self.terms))
         """The names of the forces in `last_forces`, in the order in which they are added."""
-        self._reaches = Reaches(self.robot, self.law)
+        self._reaches = ReachForces(self.robot, self.law)
         self._last_forces: Forces | Array
         self._attractor, self._state = self.robot.home.copy(), self.law.at_rest(self.robot.home)
         self.clear()
@@ -163,7 +163,7 @@ class Controller:
         return bool(self._pushes)
 
     @property
-    def reaches(self) -> Reaches:
+    def reaches(self) -> ReachForces:
         """The reaches in progress: forces that pull a marker to a target, begun by `reach_toward`."""
         return self._reaches
 

@@ -5,18 +5,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mobee._core import NUMBERS, REALS, ROW_BYTES
 from mobee.arrays import Array
-from mobee.errors import InvalidValue
 from mobee.robot.robot import Robot
-
-if TYPE_CHECKING:
-    from mobee.model.pose import Pose
 
 KINDS: tuple[Literal["solid", "field"], ...] = ("solid", "field")
 
@@ -158,27 +154,6 @@ def _read(rows: bytearray) -> tuple[Column, Array]:
     count = len(rows) // ROW_BYTES
     numbers: Column = np.ndarray((count, NUMBERS), np.int64, rows)
     return numbers, np.ndarray((count, REALS), np.float64, rows, offset=numbers.nbytes)
-
-
-def touched(pose: Pose) -> dict[str, tuple[str, ...]]:
-    """Return, for each part by name, the sorted names of the free world objects that touch the part in a pose.
-
-    An object touches a part if it overlaps a volume of a link that the part's motors move: a solid, a field (a larger volume that causes a
-    repulsive force), or an object that is attached to the link. `pose`: one pose; raises InvalidValue for a batch.
-    """
-    return {part: touched_by(pose, part) for part in pose.robot.parts}
-
-
-def touched_by(pose: Pose, part: str) -> tuple[str, ...]:
-    """Return the sorted names of the free world objects that touch a part in a pose.
-
-    An object touches a part if it overlaps a volume of a link that the part's motors move: a solid, a field (a larger volume that causes a
-    repulsive force), or an object that is attached to the link. `pose`: one pose; raises InvalidValue for a batch. `part`: name of the
-    part.
-    """
-    if pose.q.ndim != 1:
-        raise InvalidValue(f"a batch of poses, of shape {pose.q.shape}: objects touch a part in one pose; evaluate one q.")
-    return touched_in(pose.table, links_moved(pose.robot)[part])
 
 
 def touched_in(table: ContactTable, moved: frozenset[int]) -> tuple[str, ...]:

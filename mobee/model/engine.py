@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The compiled engine of one robot: evaluates poses in the compiled core (C++), in any number of threads, or one after the other.
 
-`Engine` holds the robot and the world in the core. `Track` evaluates a sequence of poses, fast if each is near the previous one: it uses
-a list of the near pairs of volumes (a neighbour list). In addition to q, an evaluation needs the world, as an immutable `Snapshot`, and
-the hands that reach (`Hands`).
+`Engine` holds the robot and the world in the core. `Neighbours` is a list of the near pairs of volumes (a neighbour list), with which
+consecutive poses are evaluated faster. In addition to q, an evaluation needs the world, as an immutable `Snapshot`, and the hands that
+reach (`Hands`).
 
 The hand of a marker is the marker's link with all links that it carries. While the marker reaches, contacts of the hand with targets are
 ignored. When the robot is at home, the marker may be inside a field (a volume that causes a repulsive force) of a link of the same part
@@ -16,10 +16,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from mobee._core import ROW_BYTES
 from mobee._core import engine as core
@@ -29,10 +28,6 @@ from mobee.model.contact import ContactTable
 from mobee.model.core_tables import VOLUME, Carried, Volumes, robot_tables, volume_row
 from mobee.model.world_object import Role, WorldObject
 from mobee.robot.robot import Robot, per_robot
-
-if TYPE_CHECKING:
-    from mobee.model.model import Model, Reaching
-    from mobee.model.pose import Pose
 
 OBSTACLE, TARGET, GHOST, ATTACHED, ATTACHED_GHOST = range(5)
 _FREE: dict[Role, int] = {"obstacle": OBSTACLE, "target": TARGET, "ghost": GHOST}
@@ -329,33 +324,3 @@ class Neighbours:
             self._core.enter(scene.handle, hand_numbers(reaching))
             self._known = scene, reaching
         return self._core.at
-
-
-class Track:
-    """Evaluates consecutive poses of one model: faster than `Model.evaluate` if each is near the previous one, with the same results.
-
-    The argument `skin` of `Model.track` is a distance: pairs of volumes that are farther apart are not checked until a volume has moved by
-    half this distance. A track takes little time to make and is for one thread at a time. For large steps between poses it is as fast as
-    `Model.evaluate`.
-    """
-
-    def __init__(self, model: Model, engine: object, skin: float) -> None:
-        """Make a track; users call `Model.track`.
-
-        `engine`: of the model; the engine of python-fcl has no list of near pairs and evaluates every pair. `skin`: m; pairs of volumes
-        nearer than this are in the list.
-        """
-        self._model = model
-        self._neighbours = Neighbours(engine, skin) if isinstance(engine, Engine) else None
-
-    def evaluate(self, q: ArrayLike, reaching: Reaching = None) -> Pose:
-        """Return the pose at q (n,) rad, or the poses along a path q (..., n) rad, evaluated in this order.
-
-        `reaching`: name of the marker that reaches for the targets, or names of up to two; None: none. The compiled engine computes the
-        contacts at once, not when they are read. Raises InvalidValue if q has another shape or is not finite, and UnknownName if the robot
-        does not have the marker.
-        """
-        pose = self._model.evaluate(q, reaching=reaching)
-        if self._neighbours is not None:
-            pose.compute_contacts(self._neighbours)
-        return pose

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from mobee.arrays import Array, checked_threads, real_array
 from mobee.errors import InvalidValue, UnknownName
-from mobee.model.engine import EMPTY, MAX_HANDS, NO_HANDS, Hand, Hands, Track
+from mobee.model.engine import EMPTY, MAX_HANDS, NO_HANDS, Hand, Hands, Neighbours
 from mobee.model.engine import Engine as NativeEngine
 from mobee.model.pose import Engine, Pose
 from mobee.model.world import World, link_pose
@@ -172,6 +172,36 @@ class Model:
             where = np.argwhere(~np.isfinite(value))[0]
             raise InvalidValue(f"q of motor {self.robot.motors[where[-1]]!r} is {value[tuple(where)]}; it must be a finite angle in rad.")
         return value
+
+
+class Track:
+    """Evaluates consecutive poses of one model: faster than `Model.evaluate` if each is near the previous one, with the same results.
+
+    The argument `skin` of `Model.track` is a distance: pairs of volumes that are farther apart are not checked until a volume has moved by
+    half this distance. A track takes little time to make and is for one thread at a time. For large steps between poses it is as fast as
+    `Model.evaluate`.
+    """
+
+    def __init__(self, model: Model, engine: Engine, skin: float) -> None:
+        """Make a track; users call `Model.track`.
+
+        `engine`: of the model; the engine of python-fcl has no list of near pairs and evaluates every pair. `skin`: m; pairs of volumes
+        nearer than this are in the list.
+        """
+        self._model = model
+        self._neighbours = Neighbours(engine, skin) if isinstance(engine, NativeEngine) else None
+
+    def evaluate(self, q: ArrayLike, reaching: Reaching = None) -> Pose:
+        """Return the pose at q (n,) rad, or the poses along a path q (..., n) rad, evaluated in this order.
+
+        `reaching`: name of the marker that reaches for the targets, or names of up to two; None: none. The compiled engine computes the
+        contacts at once, not when they are read. Raises InvalidValue if q has another shape or is not finite, and UnknownName if the robot
+        does not have the marker.
+        """
+        pose = self._model.evaluate(q, reaching=reaching)
+        if self._neighbours is not None:
+            pose.compute_contacts(self._neighbours)
+        return pose
 
 
 def _engine(robot: Robot, name: str) -> Engine:

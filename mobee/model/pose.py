@@ -10,7 +10,7 @@ import numpy as np
 
 from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
-from mobee.model.contact import Contact, ContactTable
+from mobee.model.contact import Contact, ContactTable, links_moved, touched_in
 from mobee.model.engine import Hands, Snapshot
 from mobee.model.kinematics import point_jacobian
 from mobee.model.world import link_pose
@@ -228,3 +228,24 @@ class Pose:
                 return table, torque.reshape(given.shape)
             given = given.tobytes()
         return self._engine.contacts_of_one(given, self._snapshot, self._reaching, cut)
+
+
+def touched(pose: Pose) -> dict[str, tuple[str, ...]]:
+    """Return, for each part by name, the sorted names of the free world objects that touch the part in a pose.
+
+    An object touches a part if it overlaps a volume of a link that the part's motors move: a solid, a field (a larger volume that causes a
+    repulsive force), or an object that is attached to the link. `pose`: one pose; raises InvalidValue for a batch.
+    """
+    return {part: touched_by(pose, part) for part in pose.robot.parts}
+
+
+def touched_by(pose: Pose, part: str) -> tuple[str, ...]:
+    """Return the sorted names of the free world objects that touch a part in a pose.
+
+    An object touches a part if it overlaps a volume of a link that the part's motors move: a solid, a field (a larger volume that causes a
+    repulsive force), or an object that is attached to the link. `pose`: one pose; raises InvalidValue for a batch. `part`: name of the
+    part.
+    """
+    if pose.q.ndim != 1:
+        raise InvalidValue(f"a batch of poses, of shape {pose.q.shape}: objects touch a part in one pose; evaluate one q.")
+    return touched_in(pose.table, links_moved(pose.robot)[part])

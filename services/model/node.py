@@ -19,10 +19,11 @@ from mobee.arrays import Array
 from mobee.control import constraint_forces
 from mobee.control.forces import needs_contacts, published_terms
 from mobee.errors import MobeeError
-from mobee.model.contact import KINDS, Contact, touched
+from mobee.model.contact import KINDS, Contact
 from mobee.model.engine import MAX_HANDS
 from mobee.model.kinematics import quaternion_from_matrix
 from mobee.model.pose import Pose as ModelPose
+from mobee.model.pose import touched
 from mobee.robot.cameras import cameras_of
 from mobee.robot.robot import Robot
 from mobee.vision.calibration.calibration import load_calibration

@@ -40,6 +40,7 @@ SAFETY = {  # between a command and a motor: all mutants
 OTHERS = {  # of these a sample
     "mobee/control/law.py": ("tests/mobee/control", "tests/mobee/reference"),
     "mobee/control/reach.py": ("tests/mobee/control",),
+    "mobee/control/reach_forces.py": ("tests/mobee/control",),
     "mobee/learning/planner.py": ("tests/mobee/learning",),
     "mobee/learning/transitions.py": ("tests/mobee/learning",),
     "mobee/roadmap/evolution/nes.py": ("tests/mobee/roadmap/evolution",),

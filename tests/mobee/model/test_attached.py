@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import mobee
-from mobee.model.contact import touched, touched_by
+from mobee.model.pose import touched, touched_by
 from tests.mobee.planar import LENGTH, planar_arm
 
 HAND = (3 * LENGTH, 0.0, 0.0)  # the arm is stretched

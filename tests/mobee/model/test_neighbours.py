@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import mobee
-from mobee.model.engine import Track
+from mobee.model.model import Track
 from tests.mobee.model.random_scenes import loaded, posed
 
 POSE, LIST = 1, 2  # the remembered state
