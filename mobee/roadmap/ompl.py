@@ -103,7 +103,8 @@ class Grown:
 def connected(checker: ValidityChecker, start: Array, ends: Array, seed: int, extensions: int = EXTENSIONS) -> Array | None:
     """Find a valid path from a valid pose to one of several poses by RRT-Connect.
 
-    Returns the corners of the path, (k, d) rad, or None if no path was found. Raises OmplMissing if OMPL is not installed.
+    Returns the corners of the path, (k, d) rad, or None if no path was found, or if the start or all goals are not valid. Raises
+    OmplMissing if OMPL is not installed.
 
     Args:
         checker: decides which poses and motions are valid.
@@ -113,6 +114,9 @@ def connected(checker: ValidityChecker, start: Array, ends: Array, seed: int, ex
         extensions: number of extensions of the trees after which the search ends without a path.
     """
     base, geometric, util = require_ompl()
+    sound = checker.sound(np.concatenate([start[None], ends]))
+    if not sound[0] or not sound[1:].any():
+        return None  # OMPL would wait until the end of the search for a goal that is valid
     util.setLogLevel(util.LOG_NONE)  # a warning that the seed is set again; objects made from here on use it
     util.RNG.setSeed(seed % (2**31 - 1) + 1)
     low, span = checker.low, checker.span
@@ -269,12 +273,14 @@ def rrt_connect(
         step: fraction of each motor's range between the checked poses of a motion.
 
     Returns:
-        Poses (K, n) rad from the start to a goal, or None: no path was found.
+        Poses (K, n) rad from the start to a goal, or None: no path was found; start and one goal at least must be without contacts.
 
     Raises:
         OmplMissing, InvalidValue, UnknownName: OMPL is not installed, or an argument is invalid; the message states the remedy.
     """
     free, first = _free(model, motors, start, step)
+    if first.ndim != 1:
+        raise InvalidValue(f"start has shape {first.shape}; it must be one pose ({len(model.robot.motors)},) rad.")
     ends = np.atleast_2d(_poses(model, goals))[:, free.columns]
     path = connected(free, first[free.columns], ends, seed, extensions)
     return None if path is None else free.whole(path)
@@ -369,7 +375,8 @@ def _grown(
     seed: int,
     step: float,
 ) -> Grown:
-    if milestones < 1 or (neighbours is not None and neighbours < 1):
+    numbers = [milestones] if neighbours is None else [milestones, neighbours]
+    if not all(isinstance(one, int | np.integer) and one >= 1 for one in numbers):
         raise InvalidValue(f"milestones={milestones!r}, neighbours={neighbours!r}: give whole numbers, at least 1.")
     free, _ = _free(model, motors, model.robot.home if rest is None else rest, step)
     found = grown(kind, free, milestones, neighbours, seed)

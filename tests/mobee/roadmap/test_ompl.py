@@ -15,6 +15,7 @@ pytest.importorskip("ompl")
 HOME = np.zeros(3)
 BEHIND = np.array([1.6, 0.0, 0.0])
 POST = (0.5, 0.5, 0.0)  # m, between the two poses
+INSIDE = np.array([np.pi / 4, 0.0, 0.0])  # touches the post
 
 
 def model() -> mobee.Model:
@@ -58,6 +59,16 @@ def test_without_a_path_the_result_is_none():
     assert rrt_connect(mobee.Model(planar_arm(), world), HOME, goal, motors=["m0"], extensions=50) is None
 
 
+@pytest.mark.parametrize("ends", [(HOME, INSIDE), (INSIDE, HOME), (HOME, np.empty((0, 3)))])
+def test_from_or_to_a_contact_no_search_begins(ends, monkeypatch):
+    monkeypatch.setattr("mobee.roadmap.ompl._space", lambda *_: pytest.fail("OMPL waits 20 s for a goal that is valid"))
+    assert rrt_connect(model(), *ends) is None
+
+
+def test_goals_with_contacts_are_left_out():
+    assert np.allclose(rrt_connect(model(), HOME, [INSIDE, BEHIND])[-1], BEHIND)
+
+
 @pytest.mark.parametrize("planner", [prm, prm_star])
 def test_roadmaps_hold_only_poses_and_motions_without_contacts(planner):
     known = model()
@@ -81,7 +92,10 @@ def test_a_query_is_over_the_joints_alone():
         (lambda: rrt_connect(model(), [0.0], BEHIND), "all 3 motors of planar"),
         (lambda: rrt_connect(model(), HOME, BEHIND, motors=["m7"]), "m7"),
         (lambda: rrt_connect(model(), HOME, BEHIND, step=0.0), "step"),
+        (lambda: rrt_connect(model(), [HOME, HOME], BEHIND), "start has shape"),
         (lambda: prm(model(), milestones=0), "at least 1"),
+        (lambda: prm(model(), milestones=2.5), "whole numbers"),
+        (lambda: prm(model(), neighbours=2.5), "whole numbers"),
     ],
 )
 def test_bad_input_is_refused(call, complaint):
