@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mobee.arrays import Array, Ints
+from mobee.arrays import Array, Ints, real_array
 from mobee.errors import InvalidValue, MobeeError, UnknownName
 from mobee.learning.goal import target_states
 from mobee.learning.neighbours import NO_ACTION, Edges, edges_of, joined, table_of
@@ -24,6 +24,7 @@ MODES = ("remove", "reweigh")
 
 PRIOR = (0.2, 0.01)  # imagined successes and failures of every edge: optimistic, and small compared with real observations
 NEIGHBOURS = 10  # to which a new sample is joined (thesis 4.3.1)
+BEYOND = 0.01  # rad or m that a sample may be beyond the limits, since encoders err
 DECIMALS = 9  # of rad: poses that are equal to this precision are one
 
 
@@ -176,9 +177,11 @@ class AdaptiveRoadmap:
     def grow(self, samples: ArrayLike, neighbours: int = NEIGHBOURS) -> Ints:
         """Add `samples`, poses of the d joints (N, d) rad, as vertices; return the indices of the new vertices, (N,).
 
-        Each new vertex gets edges to and from its `neighbours` nearest vertices. For this distance, each joint's difference is divided by
-        the joint's range.
+        Each new vertex gets edges to and from its `neighbours` nearest vertices, at least 1. For this distance, each joint's difference is
+        divided by the joint's range. Raises InvalidValue for samples beyond the joints' limits.
         """
+        if not isinstance(neighbours, int | np.integer) or neighbours < 1:
+            raise InvalidValue(f"neighbours={neighbours!r}: give a whole number, at least 1.")
         new = self._new(samples)
         poses, old = np.concatenate([self.space.samples, new]), len(self)
         spans = np.ptp(self.space.robot.limits[[self.space.robot.motor_index(joint) for joint in self.space.joints]], axis=1)
@@ -246,10 +249,17 @@ class AdaptiveRoadmap:
         return int(others[np.where(others == state, np.inf, away).argmin()])
 
     def _new(self, samples: ArrayLike) -> Array:
-        new = np.atleast_2d(np.asarray(samples, dtype=np.float64))
+        new = np.atleast_2d(real_array("samples", samples))
         if new.ndim != 2 or new.shape[1] != len(self.space.joints) or not len(new) or not np.isfinite(new).all():
             joints = ", ".join(self.space.joints)
             raise InvalidValue(f"samples have shape {np.shape(samples)}: give at least one finite pose of {joints}, shape (N, d), in rad.")
+        low, high = self.space.robot.limits[[self.space.robot.motor_index(joint) for joint in self.space.joints]].T
+        beyond = np.maximum(low - new, new - high)
+        if beyond.max() > BEYOND:
+            row, column = np.unravel_index(beyond.argmax(), beyond.shape)
+            raise InvalidValue(
+                f"sample {row} has {self.space.joints[column]} at {new[row, column]:.4g}: valid is {low[column]:.4g} to {high[column]:.4g}."
+            )
         return new
 
     def _change(self, samples: Array, edges: Edges, number: Ints) -> None:

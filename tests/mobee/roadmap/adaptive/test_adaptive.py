@@ -153,6 +153,17 @@ def test_bad_vertices_and_samples_are_refused():
         roadmap.plan(0, 4)
     with pytest.raises(mobee.InvalidValue, match="m0, m1, m2"):
         roadmap.grow([[0.0, 0.0]])
+    with pytest.raises(mobee.InvalidValue, match="sample 1 has m2 at 90: valid is -3 to 3"):
+        roadmap.grow([[0.0, 0.0, 0.0], [0.0, 1.0, 90.0]])  # degrees in place of radians
+    with pytest.raises(mobee.InvalidValue, match="m0 at -4"):
+        roadmap.join(0, [[-4.0, 0.0, 0.0]], 2)
+    assert roadmap.grow([[3.005, 0.0, 0.0]]).tolist() == [4]
+
+
+@pytest.mark.parametrize("neighbours", [0, -1, 1.5])
+def test_a_new_vertex_needs_neighbours(neighbours):
+    with pytest.raises(mobee.InvalidValue, match="neighbours"):
+        square().grow([[0.5, -0.5, 0.0]], neighbours=neighbours)
 
 
 def test_beliefs_without_observations_trust_every_edge():
