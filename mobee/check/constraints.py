@@ -12,7 +12,7 @@ from mobee.arrays import Array
 from mobee.check.interface import Finding, Subject, some
 from mobee.control.gains import Gains
 from mobee.control.law import stack_clauses
-from mobee.robot.motor_units import in_metres
+from mobee.robot.motor_units import in_metres, motor_units
 from mobee.robot.robot import Clause
 
 ROUNDING = np.deg2rad(0.01)  # rad: tolerance for the digits of a file
@@ -32,8 +32,8 @@ def constraints(subject: Subject) -> Iterator[Finding]:
         at_home = clause.a @ subject.home + clause.b
         if most.max() > 0 and at_home.max() < -ROUNDING:
             yield _violated_at_home(subject, index)
-        elif most.max() > 0 and (at_home / np.linalg.norm(clause.a, axis=1)).max() < Gains.default().constraint_width - ROUNDING:
-            yield _pushed_at_home(subject, index, float(at_home.max()))
+        elif most.max() > 0:
+            yield from _pushed_at_home(subject, index, at_home)
     if not dead:
         yield from _contradiction(subject, robot.clauses)
 
@@ -71,15 +71,22 @@ def _violated_at_home(subject: Subject, index: int) -> Finding:
     )
 
 
-def _pushed_at_home(subject: Subject, index: int, value: float) -> Finding:
-    return Finding(
-        "note",
-        "constraint",
-        subject.where("clause", str(index)),
-        f"home lies near the boundary of {_name(subject, index)}: a.q + b is {_text(subject, index, value)} there",
-        f"the default gains push within {_text(subject, index, Gains.default().constraint_width)} of it: the robot does not rest at home",
-        "nothing, if that is intended; else move the home",
-    )
+def _pushed_at_home(subject: Subject, index: int, at_home: Array) -> Iterator[Finding]:
+    """Yield a note if no row of a clause holds at home with the margin from which the default gains do not push (`mobee.control.law`).
+
+    `at_home`: (rows,), the value a.q + b of each row at home.
+    """
+    lengths = np.linalg.norm(subject.robot.clauses[index].a * motor_units(subject.robot), axis=1)
+    best, width = int((at_home / lengths).argmax()), Gains.default().constraint_width
+    if at_home[best] / lengths[best] < width - ROUNDING:
+        yield Finding(
+            "note",
+            "constraint",
+            subject.where("clause", str(index)),
+            f"home lies near the boundary of {_name(subject, index)}: a.q + b is {_text(subject, index, at_home[best])} there",
+            f"the default gains push where it is below {_text(subject, index, width * lengths[best])}: the robot does not rest at home",
+            "nothing, if that is intended; else move the home",
+        )
 
 
 def _idle_rows(subject: Subject, index: int, least: Array, most: Array) -> Iterator[Finding]:

@@ -3,8 +3,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from mobee.control.gains import Gains
+from mobee.control.law import Law
 from tests.mobee.check.arm import SLIDE, arm, named
 
 
@@ -30,16 +33,25 @@ def test_a_constraint_beyond_the_limits_is_an_error(tmp_path: Path) -> None:
 
 def test_a_constraint_on_a_slide_is_judged_and_written_in_metres(tmp_path: Path) -> None:
     text = '<constraintList><constraint a="{}" q="bend" b="{}"/></constraintList></bodypart>'
-    for factor, offset, said in ((-1, 0.15, "home lies near"), (1, -0.15, "home violates"), (1, -0.3, "cannot be satisfied")):
+    for factor, offset, said in ((-1, 0.11, "home lies near"), (1, -0.15, "home violates"), (1, -0.3, "cannot be satisfied")):
         robot = arm(tmp_path, *SLIDE, ("</bodypart>", text.format(factor, offset)))
         (finding,) = named(robot, "constraint")
         assert said in finding.what
+        assert "below 0.012 m:" in finding.why or not said.startswith("home lies")
         assert f" {(0.2 if said.startswith('cannot') else factor * 0.1) + offset:.4g} m " in finding.what
 
 
 def test_home_in_violation_is_found(tmp_path: Path) -> None:
     (said,) = clauses(tmp_path, row("1", -45))
     assert said == "warning: home violates the constraint on pan: a.q + b is -45 deg there"
+
+
+def test_a_constraint_on_a_slide_pushes_in_the_zone_of_the_law_only(tmp_path: Path) -> None:
+    row = '<constraintList><constraint a="-1" q="bend" b="{}"/></constraintList></bodypart>'
+    for boundary, pushes in ((0.111, True), (0.113, False)):
+        robot = arm(tmp_path, *SLIDE, ("</bodypart>", row.format(boundary)))
+        assert (len(named(robot, "constraint")) == 1) == pushes
+        assert bool(np.any(Law(robot, Gains.default()).forces(robot.home, np.zeros(2))[1])) == pushes
 
 
 @pytest.mark.parametrize(("b", "pushes"), [(10, True), (15, False)])
