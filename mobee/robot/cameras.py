@@ -112,8 +112,9 @@ def upright(ahead: Array) -> Array:
     frame, as for a camera that looks along x.
     """
     right = np.cross(ahead, UP)
-    length = float(np.linalg.norm(right))
-    right = right / length if length > UPRIGHT else np.array([0.0, -1.0, 0.0])
+    if np.linalg.norm(right) <= UPRIGHT:
+        right = np.array([0.0, -1.0, 0.0]) + ahead[1] * ahead  # perpendicular to a view that is not quite vertical
+    right = right / np.linalg.norm(right)
     return np.stack([right, np.cross(ahead, right), ahead], axis=1)
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from mobee.errors import InvalidValue, UnknownName
 from mobee.model.kinematics import link_transforms
-from mobee.robot.cameras import camera_frame, cameras_of
+from mobee.robot.cameras import camera_frame, cameras_of, upright
 from mobee.robot.load import load_robot
 
 EYED = """<ZeroPositionKinematicTree version="2.0" robotName="eyed"><bodypart name="arm"><motor name="pan" minPos="-90" maxPos="90">
@@ -41,6 +41,15 @@ def test_the_first_two_of_a_file_and_those_that_are_asked_for(tmp_path: Path) ->
     np.testing.assert_allclose(cameras["tip_2"].position, [0.0, 0.1, 0.5], atol=1e-12)  # along the marker's z, which is its normal
     np.testing.assert_allclose(cameras["turret"].position, [0.0, 0.0, 1.0])
     np.testing.assert_allclose(cameras["turret"].rotation[:, 2], [0.0, 1.0, 0.0])
+
+
+@pytest.mark.parametrize("view", [(0.0, 0.0, 1.0), (0.0, 5e-4, -1.0), (7e-4, 7e-4, 1.0), (0.0, 2e-3, 1.0), (1.0, 2.0, -3.0)])
+def test_a_picture_is_upright_or_at_least_right_angled(view: tuple[float, float, float]) -> None:
+    ahead = np.array(view) / np.linalg.norm(view)
+    rotation = upright(ahead)
+    np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-12)
+    np.testing.assert_allclose(rotation[:, 2], ahead)
+    assert np.linalg.det(rotation) == pytest.approx(1.0)
 
 
 def test_a_camera_that_cannot_be_made_is_refused() -> None:
