@@ -9,12 +9,14 @@ import time
 import weakref
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from math import isfinite
+from operator import index
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
 from mobee.database import damaged, explained, json_of, lock, opened, transaction, unlock
-from mobee.errors import MobeeError
+from mobee.errors import InvalidValue, MobeeError
 
 
 class AgentFile:
@@ -170,26 +172,31 @@ class TransitionStore(AgentFile):
     def append(self, transition: Transition) -> None:
         """Commit one transition; it is on disk when this method returns, unless `durable` is False.
 
-        Raises MobeeError unless its number `n` is the number of the last stored transition plus 1 (1 for the first transition).
+        Raises MobeeError unless its number `n` is the number of the last stored transition plus 1 (1 for the first transition),
+        InvalidValue for a value of another type than `Transition` states.
         """
         if transition.n != self._last + 1:
             raise MobeeError(f"{self.path}: {self.agent} has {self._last} transitions: append number {self._last + 1}, not {transition.n}.")
-        row = (
-            self.agent,
-            transition.n,
-            transition.s,
-            transition.a,
-            transition.s_next,
-            transition.reward,
-            transition.settled,
-            transition.duration,
-            json.dumps(transition.q),
-            json.dumps(transition.touched),
-            time.time(),
-        )
+        row = (self.agent, *self._row(transition), time.time())
         with explained(self.path):
             self._db.execute(f"INSERT INTO transitions VALUES ({', '.join('?' * len(row))})", row)
-        self._last = transition.n
+        self._last = int(transition.n)
+
+    def _row(self, made: Transition) -> tuple[Any, ...]:
+        """Return the values of a transition in the types that `load` reads again: SQLite would store a number of NumPy as bytes."""
+        try:
+            numbers = [index(one) for one in (made.n, made.s, made.a, made.s_next)]
+            reals = [float(made.reward), float(made.duration)]
+            pose, names = [float(one) for one in made.q], [str(name) for name in made.touched]
+        except (TypeError, ValueError):
+            numbers = [-1]
+        if min(numbers) < 0 or not all(map(isfinite, reals)):
+            raise InvalidValue(
+                f"{self.path}: transition {made.n!r} cannot be stored: s={made.s!r}, a={made.a!r} and s_next={made.s_next!r} must be whole "
+                f"numbers of at least 0, reward={made.reward!r} and duration={made.duration!r} finite, q numbers, "
+                f"touched={made.touched!r} names."
+            )
+        return *numbers, reals[0], bool(made.settled), reals[1], json.dumps(pose), json.dumps(names)
 
     def after(self, n: int) -> list[Transition]:
         """Read again which transitions are on disk, because a call of `append` was interrupted; return those after the first `n`."""

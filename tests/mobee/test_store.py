@@ -6,12 +6,13 @@ import sqlite3
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from mobee.errors import MobeeError
+from mobee.errors import InvalidValue, MobeeError
 from mobee.store import Transition, TransitionStore
 
 ROOT = Path(__file__).parents[2]
@@ -50,6 +51,26 @@ def test_appended_transitions_are_loaded_unchanged(tmp_path):
         assert store.load() == [transition(n) for n in range(1, 30)]
         store.append(transition(30))
         assert store.load()[-1] == transition(30)
+
+
+def test_numbers_of_numpy_are_stored_as_plain_ones(tmp_path):
+    given = Transition(*map(np.int64, (1, 2, 3, 4)), np.float32(0.5), np.bool_(True), np.float32(2.5), np.array([0.25]), [np.str_("cup")])
+    with TransitionStore(tmp_path / "run.sqlite", "torso") as store:
+        store.append(given)
+        store.append(transition(2))
+        assert store.load() == [Transition(1, 2, 3, 4, 0.5, True, 2.5, (0.25,), ("cup",)), transition(2)]
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"s": -1}, {"a": 0.5}, {"s_next": "4"}, {"reward": np.nan}, {"duration": np.inf}, {"reward": None}, {"q": ("x",)}, {"touched": None}],
+)
+def test_what_could_not_be_read_again_is_refused(tmp_path, change):
+    with TransitionStore(tmp_path / "run.sqlite", "torso") as store:
+        with pytest.raises(InvalidValue, match="transition 1 cannot be stored"):
+            store.append(replace(transition(1), **change))
+        store.append(transition(1))
+        assert store.load() == [transition(1)]
 
 
 def test_agents_in_one_file_have_their_own_numbers(tmp_path):

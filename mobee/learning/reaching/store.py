@@ -11,9 +11,10 @@ from __future__ import annotations
 import json
 import sqlite3
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import closing
-from dataclasses import astuple, dataclass, fields
+from dataclasses import dataclass, fields
+from operator import index
 from pathlib import Path
 from typing import Any
 
@@ -154,6 +155,7 @@ def place(target: ReachTarget) -> bytes:
 
 
 COLUMNS = tuple(column.name for column in fields(Step))
+FLAGS, REALS = ("failed", "settled"), ("reward", "expected", "missing", "duration")
 
 
 class ReachStore(AgentFile):
@@ -206,16 +208,17 @@ class ReachStore(AgentFile):
     def append(self, step: Step, problems: Sequence[ReachTarget]) -> None:
         """Write one step (action of the learner), and the targets of problems that are new; all is on disk when this returns.
 
-        `problems`: the targets of all problems so far, by number. Raises MobeeError if the number of the step is not the next one.
+        `problems`: the targets of all problems so far, by number. Raises MobeeError if the number of the step is not the next one,
+        InvalidValue for a value of another type than `Step` states.
         """
         if step.n != self._last + 1:
             raise MobeeError(f"{self.path}: {self.agent} has {self._last} steps: append number {self._last + 1}, not {step.n}.")
-        values = (self.agent, *_row(step), time.time())
+        values = (self.agent, *self._row(step), time.time())
         new = [(self.agent, number, _written(problems[number])) for number in range(self._problems, step.problem + 1)]
         with explained(self.path), transaction(self._db):
             self._db.executemany("INSERT INTO reach_problems VALUES (?, ?, ?)", new)
             self._db.execute(f"INSERT INTO reach_steps VALUES ({', '.join('?' * len(values))})", values)
-        self._last, self._problems = step.n, self._problems + len(new)
+        self._last, self._problems = int(step.n), self._problems + len(new)
 
     def after(self, n: int) -> list[Step]:
         """Read again which steps are on disk, because a call of `append` was interrupted; return those after the first `n`."""
@@ -243,6 +246,19 @@ class ReachStore(AgentFile):
                 raise MobeeError(f"{self.path}: step {expected} of {self.agent} is missing; the file was edited. Restore it from a copy.")
         return [self._step(*row) for row in rows]
 
+    def _row(self, step: Step) -> list[Any]:
+        """Return the values of a step in the types that `load` reads again: SQLite would store a number of NumPy as bytes."""
+        kinds: dict[str, Callable[[Any], Any]] = dict.fromkeys(COLUMNS, index) | dict.fromkeys(FLAGS, bool) | dict.fromkeys(REALS, float)
+        kinds |= {"q": lambda q: json.dumps([float(one) for one in q]), "touched": lambda names: json.dumps([str(one) for one in names])}
+        try:
+            row = {name: kind(getattr(step, name)) for name, kind in kinds.items()}
+        except (TypeError, ValueError):
+            row = dict.fromkeys(REALS, np.nan)
+        if not np.isfinite([row[name] for name in REALS]).all():
+            made = {name: getattr(step, name) for name in COLUMNS if name != "q"}
+            raise InvalidValue(f"{self.path}: {made} cannot be stored: each value must have the type that `Step` states, and be finite.")
+        return [row[name] for name in COLUMNS]
+
     def _problem(self, text: object) -> ReachTarget:
         what = f"a target of {self.agent}"
         made = json_of(self.path, what, text)
@@ -256,11 +272,10 @@ class ReachStore(AgentFile):
         values = dict(zip(COLUMNS, row, strict=True))
         what = f"step {values['n']} of {self.agent}"
         lists = {name: json_of(self.path, what, values[name]) for name in ("q", "touched")}
-        flags, reals = ("failed", "settled"), ("reward", "expected", "missing", "duration")
-        kinds = {name: float if name in reals else int for name in values if name not in lists}
+        kinds = {name: float if name in REALS else int for name in values if name not in lists}
         if any(type(values[name]) is not kind for name, kind in kinds.items()) or not all(isinstance(one, list) for one in lists.values()):
             raise damaged(self.path, f"{what} is not what MoBeE writes")
-        return Step(**values | {name: tuple(one) for name, one in lists.items()} | {name: bool(values[name]) for name in flags})
+        return Step(**values | {name: tuple(one) for name, one in lists.items()} | {name: bool(values[name]) for name in FLAGS})
 
 
 def reaching_parts(file: str | Path) -> tuple[str, ...]:
@@ -275,10 +290,6 @@ def reaching_parts(file: str | Path) -> tuple[str, ...]:
 
 def _has_reaches(database: sqlite3.Connection) -> bool:
     return database.execute("SELECT 1 FROM sqlite_master WHERE name = 'reach_steps'").fetchone() is not None
-
-
-def _row(step: Step) -> tuple[Any, ...]:
-    return tuple(json.dumps(value) if isinstance(value, tuple) else value for value in astuple(step))
 
 
 def _written(target: ReachTarget) -> str:

@@ -5,14 +5,15 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from mobee.errors import ActionInterrupted, MobeeError
+from mobee.errors import ActionInterrupted, InvalidValue, MobeeError
 from mobee.learning.reaching.reach_agent import ReachAgent
-from mobee.learning.reaching.store import ReachStore, reaching_parts
+from mobee.learning.reaching.store import ReachStore, Step, reaching_parts
 from mobee.reach import ReachTarget
 from mobee.store import Transition, TransitionStore
 from tests.mobee.learning.reaching.toy import HANDS, PLACES, SPACE, TARGETS, agent, plant
@@ -159,3 +160,23 @@ def test_steps_have_no_gap(tmp_path):
         learner.learn(TARGETS, 2)
         with pytest.raises(MobeeError, match="append number 3, not 1"):
             store.append(store.load()[0], learner.problems.targets)
+
+
+STEP = Step(1, 1, 0, 2, -1, 3, False, 0.5, 0.25, 0.125, True, 2.0, (0.5, 1.5), ("cup",))
+
+
+def test_numbers_of_numpy_are_stored_as_plain_ones(tmp_path):
+    numbers = {name: np.int64(getattr(STEP, name)) for name in ("n", "number", "problem", "s", "a", "s_next")}
+    reals = {name: np.float32(getattr(STEP, name)) for name in ("reward", "expected", "missing", "duration")}
+    given = replace(STEP, **numbers, **reals, failed=np.bool_(False), settled=np.bool_(True), q=np.array(STEP.q), touched=["cup"])
+    with ReachStore(tmp_path / "run.sqlite", PART) as store:
+        store.append(given, TARGETS)
+        assert store.load() == [STEP]
+
+
+@pytest.mark.parametrize("change", [{"s": 1.5}, {"reward": np.nan}, {"missing": None}, {"q": None}, {"touched": None}])
+def test_what_could_not_be_read_again_is_refused(tmp_path, change):
+    with ReachStore(tmp_path / "run.sqlite", PART) as store:
+        with pytest.raises(InvalidValue, match="cannot be stored"):
+            store.append(replace(STEP, **change), TARGETS)
+        assert store.load() == [] and store.problems() == []
