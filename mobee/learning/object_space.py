@@ -38,7 +38,7 @@ class ObjectSpace(Space):
 
     def __init__(self, postures: Space, grid: Grid, name: str) -> None:
         if isinstance(postures, ObjectSpace):
-            raise InvalidValue(f"{postures} holds the cell of {postures.name} already: the states can hold the cell of one object only.")
+            raise InvalidValue(f"{postures} holds the cell of an object already: states can hold the cell of one object only.")
         count = len(postures) * len(grid)
         if count > MAX_STATES:
             raise InvalidValue(f"{len(postures)} postures x {len(grid)} cells make {count} states; the limit is {MAX_STATES}.")
