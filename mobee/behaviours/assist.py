@@ -15,10 +15,12 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from mobee.arrays import Array
+from mobee.control.forces import checked
 from mobee.errors import InvalidValue
 from mobee.learning.reaching.predictors import RewardPredictor
 from mobee.model.kinematics import link_transforms, tables
 from mobee.model.model import Model
+from mobee.robot.motor_units import motor_units
 from mobee.robot.robot import Robot
 
 Worth = Callable[[Array], Array]
@@ -58,12 +60,14 @@ class Assist:
             part: the part that carries the arm and may move, such as "torso".
             arm: the part that reaches.
             worth: how well the arm reaches places (k, 3) m with its base at home.
-            levels: number of positions of each motor in the grid.
+            levels: number of positions of each motor in the grid, at least 2.
 
         Raises:
-            InvalidValue: the part does not carry the arm.
+            InvalidValue: the part does not carry the arm, or `levels` is not valid.
             UnknownName: the robot does not have the part or the arm.
         """
+        if isinstance(levels, bool) or not isinstance(levels, int) or levels < 2:
+            raise InvalidValue(f"levels={levels!r}: give a whole number, 2 or more.")
         self.model, self.part = model, model.robot.part(part)
         self._worth, self._base = worth, base_link(model.robot, arm)
         robot, span = model.robot, self.part.slice
@@ -71,7 +75,8 @@ class Assist:
             raise InvalidValue(f"{part} of {robot.name!r} does not carry {arm}: name a part that moves {robot.links[self._base]}")
         self._home = link_transforms(robot, robot.home)[self._base]
         low, high = robot.limits[span].T
-        spare = np.minimum(INSIDE, 0.25 * (high - low))
+        self._units = motor_units(robot)[span]
+        spare = np.minimum(INSIDE * self._units, 0.25 * (high - low))
         compared = [np.linspace(a, b, levels) for a, b in zip(low + spare, high - spare, strict=True)]
         self._postures = np.stack(np.meshgrid(*compared, indexing="ij"), axis=-1).reshape(-1, len(compared))
 
@@ -79,17 +84,18 @@ class Assist:
         """Return the best posture of the part for a target (3,) m, root frame; all other motors stay as in the posture q (n,) rad.
 
         The score of a posture is the worth of the target (how well the arm reaches it from this posture, at most 1), minus 0.1 per rad^2 of
-        motion. The result is the posture with the highest score among those without contacts of solids whose score is more than 0.05 above
-        that of the present posture; if there is none, the present posture.
+        motion. For a motor that slides, 1 rad is the length of `mobee.robot.motor_units.motor_units`. The result is the posture with the
+        highest score among those without contacts of solids whose score is more than 0.05 above that of the present posture; if there is
+        none, the present posture. Raises InvalidValue for a wrong shape, and for numbers that are not finite.
         """
-        span = self.part.slice
+        q, target, span = checked("q", q, len(self.model.robot.motors)), checked("target", target, 3), self.part.slice
         postures = np.concatenate([q[None, span], self._postures])
         whole = np.repeat(q[None], len(postures), axis=0)
         whole[:, span] = postures
         moved = link_transforms(self.model.robot, whole)[:, self._base]
         seen = np.linalg.solve(moved, np.append(target, 1.0)[None, :, None])  # the target as the base link at zero pose sees it
         worth = self._worth((self._home @ seen)[:, :3, 0])
-        score = worth - EFFORT * ((postures - q[span]) ** 2).sum(axis=1)
+        score = worth - EFFORT * (((postures - q[span]) / self._units) ** 2).sum(axis=1)
         order = np.argsort(-score, kind="stable")
         better = order[score[order] > score[0] + LEAST_GAIN]
         free = better[np.asarray(self.model.evaluate(whole[better]).count) == 0] if len(better) else better

@@ -13,6 +13,7 @@ import numpy as np
 
 from mobee.arrays import Array, real_array
 from mobee.errors import InvalidValue
+from mobee.robot.motor_units import motor_units
 from mobee.robot.robot import Robot
 
 WINDOW = 0.5  # s: places within this time of the newest are used
@@ -94,6 +95,7 @@ class Reference:
         table = robot.motor_table[where]
         self._fastest = speed * np.array([motor.max_velocity for motor in table])
         self._hardest = ACCELERATION * np.array([motor.max_acceleration for motor in table])
+        self._leash = LEASH * motor_units(robot)[where]
         self._low, self._high = np.minimum(low, q), np.maximum(high, q)
         self.q, self.velocity = q.copy(), np.zeros(len(q))
 
@@ -106,7 +108,8 @@ class Reference:
         Args:
             goal: (m,) rad, the present goal.
             goal_velocity: (m,) rad/s.
-            near: (m,) rad, the expected positions of the motors; the reference stays within 15 degrees of them.
+            near: (m,) rad, the expected positions of the motors; the reference stays within 15 degrees of them (for a motor that
+                slides, a length: `mobee.robot.motor_units.motor_units`).
             dt: s.
         """
         left = goal - self.q
@@ -115,5 +118,5 @@ class Reference:
         change = self._hardest * dt
         before = self.q
         self.velocity = self.velocity + np.clip(wanted - self.velocity, -change, change)
-        self.q = np.clip(np.clip(before + self.velocity * dt, near - LEASH, near + LEASH), self._low, self._high)
+        self.q = np.clip(np.clip(before + self.velocity * dt, near - self._leash, near + self._leash), self._low, self._high)
         self.velocity = np.where((self.q <= self._low) | (self.q >= self._high), (self.q - before) / dt, self.velocity)

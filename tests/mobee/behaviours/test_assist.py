@@ -17,6 +17,7 @@ from mobee.model.world_file import load_world
 from mobee.reach import ReachTarget
 from mobee.robot.load import load_robot
 from mobee.simulation import OfflinePlant
+from tests.mobee.control.test_slides import with_units
 from tests.mobee.planar import planar_arm
 
 ROBOT = load_robot("icub")
@@ -76,6 +77,29 @@ def test_the_torso_brings_the_target_to_the_best_place_in_the_frame_of_the_arm()
     q[TORSO] = chosen.q
     assert np.linalg.norm(seen_from_home(target) - best) < 0.04
     assert chosen.worth > 0.5 > chosen.worth_now
+
+
+@pytest.mark.parametrize("unit", [1.0, 0.05, 0.3])
+def test_a_trunk_that_slides_moves_as_one_that_turns(unit: float) -> None:
+    """In its own unit: up to 10 degrees before its limit, with the same cost."""
+    robot = with_units(np.array([unit, 1.0, 1.0]))
+    chosen = Assist(Model(robot), "trunk", "arm", lambda places: np.linspace(0.0, 1.0, len(places)), levels=3).posture(np.zeros(3), FAR)
+    assert chosen.q == pytest.approx([unit * np.deg2rad(90.0)])
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [({"q": np.full(41, np.nan)}, "q: number 0"), ({"q": np.zeros(3)}, "q of shape"), ({"target": FAR * np.nan}, "target: number 0")],
+)
+def test_an_invalid_posture_or_target_is_refused(assist: Assist, change: dict[str, np.ndarray], message: str) -> None:
+    with pytest.raises(InvalidValue, match=message):
+        assist.posture(**{"q": ROBOT.home, "target": FAR} | change)
+
+
+@pytest.mark.parametrize("levels", [-1, 0, 1, 2.0])
+def test_a_number_of_levels_is_whole(levels: int) -> None:
+    with pytest.raises(InvalidValue, match="levels=.*2 or more"):
+        Assist(Model(ROBOT), "torso", "right_arm", lambda places: places[:, 0], levels=levels)
 
 
 def test_the_map_of_a_reach_learner_is_the_best_that_it_predicts() -> None:

@@ -6,8 +6,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mobee.behaviours.tracking import JUMP, TargetTrack
+from mobee.behaviours.tracking import JUMP, LEASH, Reference, TargetTrack
 from mobee.errors import InvalidValue
+from tests.mobee.control.test_slides import with_units
 
 
 def test_the_place_is_extrapolated_over_the_latency(rng: np.random.Generator) -> None:
@@ -52,3 +53,13 @@ def test_a_place_that_is_none_is_refused(place: list[float]) -> None:
 def test_the_patience_is_a_time() -> None:
     with pytest.raises(InvalidValue, match="patience"):
         TargetTrack(patience=0.0)
+
+
+@pytest.mark.parametrize("unit", [1.0, 0.05])
+def test_a_reference_waits_15_degrees_ahead_of_a_blocked_motor_in_the_unit_of_a_slide(unit: float) -> None:
+    robot = with_units(np.array([unit, 1.0, 1.0]))
+    (low, high), here = robot.limits[:1].T, np.zeros(1)
+    reference = Reference(robot, slice(0, 1), here, low, high)
+    for _ in range(200):
+        reference.catch_up(high, np.zeros(1), here, 0.02)
+    assert reference.q == pytest.approx([unit * LEASH])
