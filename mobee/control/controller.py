@@ -269,7 +269,8 @@ class Controller:
     def hold(self, part: str, q: Array) -> None:
         """Stop a part: set its velocity in the control law's state to 0, and its attractor to its measured position q (n_part,) rad.
 
-        The commanded velocity then decreases as fast as the acceleration limit allows.
+        The commanded velocity then decreases as fast as the acceleration limit allows. Forces given to `force` and `push`, and those that
+        pull a marker to a target (`reach_toward`), continue, and move the part again: end them too (`clear`, `end_reach`).
         """
         self.set_attractor(part, q)
         where = self.robot.part(part).slice
@@ -279,6 +280,7 @@ class Controller:
         """Set one part to rest at its measured q (n_part,) rad, as `reset` does for all parts. Use it if the motors do not follow commands.
 
         The next commands start from velocity 0 and from the position q. After `hold`, in contrast, they continue from the last commands.
+        Forces given to `force`, `push` and `reach_toward` continue, as in `hold`.
         """
         self.set_attractor(part, q)
         where = self.robot.part(part).slice

@@ -89,7 +89,8 @@ def run_batch(work: Callable[[int], T], seeds: Iterable[int], processes: int | N
 class PlantBatch:
     """Several offline plants (simulated robots) of one model; the results of each are bit-equal to those of a separate `OfflinePlant`.
 
-    In all methods, `which` (k,) are indices of `plants`, each at most once; other values raise InvalidValue.
+    All plants have the seed 0, so that the noise of their encoders is equal; `plants[k].restart(seed)` gives a plant another seed. In all
+    methods, `which` (k,) are indices of `plants`, each at most once; other values raise InvalidValue.
 
     Args:
         model: the robot in its world.
