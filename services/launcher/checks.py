@@ -24,7 +24,7 @@ from services.common import rpc
 from services.common.config import ConfigError, nearest
 from services.common.identity import DEFAULT_ENDPOINT
 from services.common.session import BusUnreachable, open_client
-from services.common.worlds import NO_WORLD
+from services.common.worlds import NO_WORLD, robot_hash
 from services.launcher.scenario import Part, Scenario
 
 _CONNECT_TIMEOUT, _ANSWER_TIMEOUT = 0.5, 1.0  # s: a system that runs answers at once
@@ -187,7 +187,7 @@ def check_robots(scenario: Scenario) -> dict[str, Robot]:
     """Load the robots of all services; return a dict from the name or path in their settings to the robot.
 
     Raises ConfigError with a message of one line if a robot or world cannot be read, if its file has elements that would be ignored,
-    or if a service names a part or motor that its robot does not have.
+    if a service names a part or motor that its robot does not have, or if shipped services have different robots.
     """
     from mobee.model.world_file import load_world
     from mobee.robot.load import load_robot
@@ -209,6 +209,12 @@ def check_robots(scenario: Scenario) -> dict[str, Robot]:
             if joint not in robot.part(name).motors:
                 place = scenario.where(f"services.{part.who}.joints")
                 raise ConfigError(f"{place}: joints: {name} has no motor {joint!r}.{nearest(joint, robot.part(name).motors)}")
+    named = {part.who: part.config.robot for part in scenario.parts if part.entry.module.startswith("services.")}
+    if len({robot_hash(robots[robot]) for robot in named.values()}) > 1:
+        listed = ", ".join(f"{who} {robot}" for who, robot in named.items())
+        raise ConfigError(
+            f"{scenario.where('shared.robot')}: robots differ: {listed}. All services serve one robot: set it as shared.robot."
+        )
     return robots
 
 

@@ -116,11 +116,14 @@ def read_scenario(
     except RecursionError:
         raise ConfigError(f"{path}: nested too deeply") from None
     _place_files(data, path.parent)
-    for who in with_also if isinstance(data.get("services"), dict) else ():
-        data["services"].setdefault(who, {})
-    if record and isinstance(data.get("services"), dict) and _has_robot(data["services"]):
-        data["services"].setdefault(RECORDER, {})
+    services = data["services"] if isinstance(data.get("services"), dict) else {}
+    also = [*with_also, *([RECORDER] if record and _has_robot(services) else [])]
+    added = [services.setdefault(who, {}) for who in also if services and who not in services]
     origins = _override(data, settings)
+    sim = services.get("robot_sim")
+    for table in added:
+        if isinstance(sim, dict) and "robot" in sim:  # else they have the shared one
+            table.setdefault("robot", sim["robot"])
 
     def place(field: str) -> str:
         for name, setting in origins.items():
@@ -228,7 +231,10 @@ def _part(who: str, table: dict[str, Any], shared: Mapping[str, Any], where: Cal
     if not re.fullmatch(r"[a-z0-9_]+", who) or who in ("launcher", "router") or who.startswith(HOST_LAUNCHER):
         raise ConfigError(f"{where(place)}: {who!r} is no valid name of a service: use a-z, 0-9 and _, but not launcher or router")
     own = {key: value for key, value in table.items() if key != "module"}
-    entry = entry_of(who, table.get("module"))
+    module = table.get("module")
+    if module is not None and not (isinstance(module, str) and re.fullmatch(r"[^.\s]+(\.[^.\s]+)*", module)):
+        raise ConfigError(f"{where(f'{place}.module')}: module {module!r} is no name of a module: write it as my_package.my_service")
+    entry = entry_of(who, module)
     if entry is None:
         raise ConfigError(f"{where(place)}: unknown service {who!r}.{nearest(who, NAMES)} Another program needs `module = ...`.")
     cls = _config_class(entry, where(place))
@@ -260,8 +266,8 @@ def _config_class(entry: Entry, where: str) -> type[ServiceConfig]:
     module, _, name = entry.config.partition(":")
     try:
         found = getattr(importlib.import_module(module), name)
-    except (ImportError, AttributeError) as error:
-        raise ConfigError(f"{where}: cannot import {name} from {module} ({error})") from None
+    except Exception as error:  # of a user's module, which may fail in any way
+        raise ConfigError(f"{where}: cannot import {name} from {module} ({type(error).__name__}: {error})") from None
     if not (isinstance(found, type) and issubclass(found, ServiceConfig)):
         raise ConfigError(f"{where}: {entry.config} is not a subclass of ServiceConfig")
     return found

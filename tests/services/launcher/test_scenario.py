@@ -68,6 +68,24 @@ def test_model_and_controller_must_use_one_set_of_gains_and_terms() -> None:
         check_gains(read_scenario("default", ['services.controller.terms=["my_forces:viscous"]']))
 
 
+def test_services_that_are_added_have_the_robot_of_the_simulator(tmp_path: Path) -> None:
+    path = tmp_path / "own.toml"
+    path.write_text('[services.robot_sim]\nrobot = "katana"\n')
+    scenario = read_scenario(str(path), with_also=["monitor"], record=True)
+    assert {part.who: part.config.robot for part in scenario.parts} == dict.fromkeys(("recorder", "robot_sim", "monitor"), "katana")
+    scenario = read_scenario(str(path), ["services.robot_sim.robot=icub_2014", "services.monitor.robot=icub"], [], ["monitor"], record=True)
+    assert [part.config.robot for part in scenario.parts] == ["icub_2014", "icub_2014", "icub"]
+
+
+def test_all_services_must_have_one_robot(tmp_path: Path) -> None:
+    (tmp_path / "copy.xml").write_text((Path(load.__file__).parent / "robots" / "katana.xml").read_text())
+    with pytest.raises(ConfigError, match=r"robots differ: robot_sim katana, model icub, .*set it as shared.robot"):
+        check_robots(read_scenario("reach", ["services.robot_sim.robot=katana"], leave_out=["vision", "renderer", "monitor"]))
+    path = tmp_path / "two.toml"
+    path.write_text('[services.robot_sim]\nrobot = "katana"\n[services.model]\nrobot = "copy.xml"\n')
+    assert len(check_robots(read_scenario(str(path)))) == 2  # one robot by two names
+
+
 def test_parts_come_in_the_order_of_their_start() -> None:
     names = [part.who for part in read_scenario("default").parts]
     assert names == [
@@ -353,6 +371,29 @@ def test_a_port_in_use_is_named_with_its_remedy() -> None:
         with pytest.raises(PortInUse, match="--set services.monitor.web_port="):
             check_ports(read_scenario("default", [setting]))
         check_ports(read_scenario("default", [setting], leave_out=["monitor"]))
+
+
+@pytest.mark.parametrize(
+    ("module", "said"),
+    [
+        ("''", "module '' is no name of a module"),
+        ("'..up'", "module '..up' is no name of a module"),
+        ("3", "module 3 is no name of a module"),
+        ("'none_of_that_name'", "cannot import Config from none_of_that_name.config (ModuleNotFoundError"),
+        ("'half_written'", "cannot import Config from half_written.config (SyntaxError"),
+    ],
+)
+def test_a_program_that_cannot_be_used_is_refused_in_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, module: str, said: str
+) -> None:
+    (tmp_path / "half_written").mkdir()
+    (tmp_path / "half_written" / "config.py").write_text("class Config(")
+    monkeypatch.syspath_prepend(tmp_path)
+    path = tmp_path / "own.toml"
+    path.write_text(f"[services.own]\nmodule = {module}\n")
+    with pytest.raises(ConfigError, match=re.escape(said)) as refused:
+        read_scenario(str(path))
+    assert str(refused.value).startswith(f"{path}:")
 
 
 def test_another_program_may_take_the_place_of_a_service(tmp_path: Path) -> None:
