@@ -22,7 +22,7 @@ from mobee.check.interface import SEVERITIES, Finding, Severity, Subject, length
 from mobee.check.motors import coupling, home_limits, home_zones, idle_motors, idle_parts, joint_limits, unreachable_markers
 from mobee.check.shapes import fields, hulls, identical_shapes, missing_meshes
 from mobee.check.size_and_mass import masses, radians, size
-from mobee.check.touching import always_touching, foreign_solids, home_contacts, world_contacts
+from mobee.check.touching import always_touching, foreign_solids, home_contacts, long_clusters, world_contacts
 from mobee.errors import InvalidValue, RobotFileError, Simplified, UnknownName
 from mobee.model.world import World, WorldObject
 from mobee.model.world_file import WORLDS, load_world, shipped_worlds
@@ -119,6 +119,7 @@ CHECKS: tuple[Check, ...] = (
     size,
     radians,
     always_touching,
+    long_clusters,
     home_contacts,
     world_contacts,
     foreign_solids,

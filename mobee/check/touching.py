@@ -20,6 +20,7 @@ from mobee.errors import InvalidValue, RobotFileError
 from mobee.model.contact import Contact
 from mobee.model.model import Model
 from mobee.robot.load import ROBOTS, find_file, load_robot
+from mobee.robot.pairs import CLUSTER, CLUSTER_REASON, joint_clusters
 from mobee.robot.robot import LinkPair, Robot, Shape
 from mobee.robot.urdf.srdf import find_srdf
 from mobee.robot.urdf.write import disabled_and_enabled, write_disabled
@@ -266,6 +267,28 @@ def _parting(subject: Subject, contact: Contact) -> str:
     if contact.second_link < 0:
         return remedy
     return f"{remedy}; where only hulls of meshes overlap: {_ignoring(subject, contact.first, contact.second)}{_written(subject)}"
+
+
+LONG = 0.15  # m: the shoulder, wrist or hand of a large robot is shorter
+
+
+def long_clusters(subject: Subject) -> Iterator[Finding]:
+    """Yield a finding for each long cluster of joints: its outer links can touch, but are not tested (`mobee.robot.pairs`)."""
+    robot, joints = subject.robot, subject.robot.joints
+    for cluster in joint_clusters(joints):
+        points = np.array([joints[k].point for k in cluster])
+        span = float(np.linalg.norm(points[:, None] - points, axis=2).max())
+        outer = frozenset((joints[cluster[0]].parent, cluster[-1] + 1))
+        if span > LONG and robot.untested.get(outer, "").startswith(CLUSTER_REASON):
+            yield Finding(
+                "warning",
+                "long-cluster",
+                subject.where("joint", joints[cluster[0]].name),
+                f"{count(cluster, 'joint')} from {joints[cluster[0]].name!r} on are one cluster, {length(span)} long",
+                f"joints less than {length(CLUSTER)} apart count as one place: the links around them are never tested against each other, "
+                "also where they can touch",
+                "`mobee convert IN OUT.xml` writes a file that lists these pairs as <ignore>: remove the lines of pairs that can touch",
+            )
 
 
 def foreign_solids(subject: Subject) -> Iterator[Finding]:

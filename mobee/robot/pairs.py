@@ -12,7 +12,8 @@ Joined links: a cluster is a group of joints, each within 5 cm of its parent joi
 shoulder, the elbow with pro-supination, the wrist, the neck or the torso. A cluster connects the link that carries it and all links that
 its joints move. The shapes of these links overlap at the cluster, since each fills the whole cluster. So each pair of these links counts as
 joined: chest with the whole shoulder and upper arm, upper arm with elbow and forearm, forearm with wrist and hand. So hands and forearms
-are tested against torso, head and the other arm, and only pairs that overlap in every pose are excluded. If a robot file has
+are tested against torso, head and the other arm. A chain of links shorter than 5 cm is one cluster too, so that none of its links are
+tested against each other: `mobee check` warns of clusters that are long (`mobee.check.touching.long_clusters`). If a robot file has
 adjacency="listed", only pairs in <ignore> tags are excluded, so that `write_xml` can keep the pairs of any robot.
 """
 
@@ -27,6 +28,7 @@ from mobee.arrays import Ints
 from mobee.robot.robot import Joint, LinkPair, Robot, Shape
 
 CLUSTER = 0.05  # m: joints whose points are nearer than this belong together
+CLUSTER_REASON = "joined at a cluster of joints"
 MAX_NAMED = 4  # joints of a cluster that a reason lists
 
 
@@ -36,18 +38,18 @@ def joined_links(joints: Sequence[Joint]) -> dict[LinkPair, str]:
     A cluster is a group of joints that are close together: each joint after the first is less than CLUSTER (5 cm) from its parent joint, or
     from a joint on the same link.
     """
-    clusters = _clusters(joints)
+    clusters = joint_clusters(joints)
     joined: dict[LinkPair, str] = {}
     for cluster in clusters:
         names = ", ".join(joints[k].name for k in cluster[:MAX_NAMED]) + (", ..." if len(cluster) > MAX_NAMED else "")
-        reason = f"joined at {names}" if len(cluster) == 1 else f"joined at a cluster of joints ({names})"
+        reason = f"joined at {names}" if len(cluster) == 1 else f"{CLUSTER_REASON} ({names})"
         links = sorted({joints[k].parent for k in cluster} | {k + 1 for k in cluster})
         for pair in combinations(links, 2):
             joined.setdefault(frozenset(pair), reason)
     return joined
 
 
-def _clusters(joints: Sequence[Joint]) -> list[list[int]]:
+def joint_clusters(joints: Sequence[Joint]) -> list[list[int]]:
     """Return the clusters of joints, each as a list of indices of joints.
 
     A joint is compared with its parent joint, then with earlier joints on the same link. It joins the cluster of the first of these that is

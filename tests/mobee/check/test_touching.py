@@ -1,22 +1,45 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from mobee.check import check_robot
 from mobee.check.touching import touching_pairs
 from mobee.errors import InvalidValue
 from mobee.model import World, sphere
+from mobee.model.model import Model
 from mobee.robot.load import load_robot
+from mobee.robot.xml.write import write_xml
 from tests.mobee.check.arm import arm, named
+from tests.mobee.robot.robot_files import robot_file
 
 PALM = ("<marker", '<sphere name="palm" radius="0.02"/><marker')
 STONE = ('<bodypart name="arm">', '<bodypart name="arm"><sphere name="stone" radius="0.05" px="-0.4" pz="0.165"/>')
 HUB = ('<bodypart name="arm">', '<bodypart name="arm"><box name="hub" width="0.02" height="0.02" depth="0.5" px="-0.02" pz="0.1"/>')
 BALL = ("<marker", '<sphere name="ball" radius="0.3"/><marker')
 LINK = ('<joint name="bend"', '<joint name="bend" moves="forearm"')
+
+
+@pytest.mark.parametrize(("step", "clusters"), [(0.04, ["9 joints from 'm0' on are one cluster, 0.32 m long"]), (0.06, [])])
+def test_a_chain_of_short_links_that_are_not_tested_is_found(tmp_path: Path, step: float, clusters: list[str]) -> None:
+    head = [f'<motor name="m{k}" minPos="-90" maxPos="90"><joint y="1"><link z="{step}" radius="0.01">' for k in range(9)]
+    path = robot_file(
+        tmp_path, f'<bodypart name="arm"><link z="{step}" radius="0.01">', *head, *["</link></joint></motor>"] * 9, "</link></bodypart>"
+    )
+    robot = load_robot(path)
+    found = [finding for finding in check_robot(robot) if finding.check == "long-cluster"]
+    assert [(finding.severity, finding.what, finding.where) for finding in found] == [("warning", said, f"{path}:3") for said in clusters]
+    curled = np.full(9, np.pi / 2.0)  # four links make a square, so that the fifth is on the first
+    assert bool(Model(robot).evaluate(curled).contacts) == (not clusters)
+    free = re.sub("<ignore.*cluster.*\n", "", write_xml(robot, tmp_path / "listed.xml").read_text())
+    (tmp_path / "listed.xml").write_text(free)
+    again = load_robot(tmp_path / "listed.xml")
+    assert Model(again).evaluate(curled).contacts
+    assert [finding for finding in check_robot(again) if finding.check == "long-cluster"] == []
 
 
 @pytest.mark.parametrize(("home", "found"), [("10", 1), ("60", 0)])
