@@ -6,6 +6,7 @@ The worlds are small MDPs that are given as tables of outcomes, probabilities an
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,8 @@ from mobee.errors import ActionInterrupted, InvalidValue
 from mobee.learning.discrete import DiscreteSpace, InstantPlant
 from mobee.learning.tabular import TabularWorld, deep_sea, river_swim
 from mobee.plant import Outcome
+
+_ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")  # in the repr of a function: another in each process
 
 
 class EnvPlant(InstantPlant):
@@ -66,7 +69,9 @@ class EnvPlant(InstantPlant):
     def settings(self) -> dict[str, Any]:
         """The id and the arguments of the environment, as JSON values; empty for an environment that was not made by its id."""
         spec = self.env.spec
-        return {} if spec is None else {"env": spec.id, "arguments": {name: repr(value) for name, value in spec.kwargs.items()}}
+        if spec is None:
+            return {}
+        return {"env": spec.id, "arguments": {name: _ADDRESS.sub("", repr(value)) for name, value in spec.kwargs.items()}}
 
     @property
     def q(self) -> Array:

@@ -140,7 +140,8 @@ class Planner:
     def plan(self, start: int) -> Plan:
         """Return the plan from the state `start`.
 
-        Raises InvalidValue if there is no such state, MobeeError if no path to a target is known.
+        Raises InvalidValue if there is no such state, MobeeError if no path to a target is known, or if the value of the start is too small
+        to be computed.
         """
         if len(path := target_states(self.space, start).tolist()) != 1:
             raise InvalidValue(f"start {start!r}: give the number of one state.")
@@ -166,7 +167,10 @@ class Planner:
         outcomes, probabilities = self._outcomes(state)
         nearer = np.where(self.values[outcomes] > self.values[state], probabilities, 0.0)
         if self.values[state] <= 0.0 or not nearer.any():
-            raise MobeeError(f"no path is known from state {state} of {self.space.part} to {self.targets.tolist()}: try other states.")
+            raise MobeeError(
+                f"no path is known from state {state} of {self.space.part} to {self.targets.tolist()}, or it is so long or so unreliable "
+                f"that with discount={self.discount:g} its value is below {TOLERANCE:g}: try other states, or a discount nearer to 1."
+            )
         best = int(nearer.argmax())
         return int(outcomes[best]), float(probabilities[best])
 

@@ -121,6 +121,16 @@ def test_states_and_actions_may_begin_anywhere() -> None:
     assert [int(plant.act("environment", plant.space.aim(0, action)).q[0]) for action in (0, 1)] == [0, 1]
 
 
+def test_an_argument_that_is_a_function_has_the_same_record_in_every_process() -> None:
+    def reward(*transition: Any) -> float:
+        return 0.0
+
+    options: dict[str, Any] = {"joints": ("l_shoulder_pitch", "l_elbow"), "neighbours": "equidistant"}
+    recorded = EnvPlant(gymnasium.make("MoBeE/Lattice-v0", reward=reward, **options)).settings["arguments"]
+    assert recorded["reward"].startswith("<function ") and " at 0x" not in recorded["reward"]
+    assert recorded["neighbours"] == "'equidistant'"
+
+
 def test_invalid_spaces_parts_and_actions_are_refused() -> None:
     with pytest.raises(mobee.InvalidValue, match="must be Discrete"):
         EnvPlant(gymnasium.make("CartPole-v1"))

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from mobee.errors import InvalidValue, MobeeError
+from mobee.learning.discrete import DiscreteSpace
 from mobee.learning.planner import Planner, passing, shortest_actions, steps_between
 from mobee.learning.tabular import TabularPlant, half_space, ideal
 from mobee.learning.transitions import TransitionModel
@@ -104,6 +105,10 @@ def test_without_a_path_the_error_names_the_states():
     table = Table(SPACE, {(s, 80): 1.0 for s in range(81) if 80 in SPACE.actions(s)})
     with pytest.raises(MobeeError, match=r"from state 0 of left_arm to \[80\]"):
         Planner(SPACE, table, [80]).plan(0)
+    line = DiscreteSpace(100, 1, goals=np.minimum(np.arange(100)[:, None] + 1, 99))
+    with pytest.raises(MobeeError, match="or it is so long or so unreliable that with discount=0.5 its value is below"):
+        Planner(line, TransitionModel(line).debiased(), [99], discount=0.5).plan(0)
+    assert Planner(line, TransitionModel(line).debiased(), [99]).plan(0).shortest == 99
     with pytest.raises(InvalidValue, match="no such state. Valid are 0 to 80"):
         Planner(SPACE, table, [81])
     with pytest.raises(InvalidValue, match="no such state"):
