@@ -10,11 +10,10 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from msgspec import ValidationError, convert
-
 from mobee.errors import MobeeError
 from mobee_cli.connect import add_endpoint
 from mobee_cli.errors import UserError
+from services.common.config import ConfigError, convert
 from services.common.exit_codes import BAD_INPUT, ENVIRONMENT
 from services.common.session import NAMESPACE, BusUnreachable
 from services.recorder.files import parts_of
@@ -46,14 +45,15 @@ def run(arguments: argparse.Namespace) -> int:
         raise UserError(f"{folder}: there is no such folder", BAD_INPUT)
     if parts_of(folder):
         raise UserError(f"{folder} holds a recording already, {parts_of(folder)[0].name}: name another folder with --to", BAD_INPUT)
-    print(f"recording {arguments.endpoint} to {folder}/messages-*.mcap; Ctrl-C ends it", flush=True)
     settings = {name: getattr(arguments, name) for name in ("endpoint", "namespace", "robot", "largest", "everything")}
     try:
-        config = convert({**settings, "run_dir": str(folder)}, Config)
-        record(f"mobee_record_{os.getpid()}", config, _settings(arguments.endpoint, arguments.namespace))
+        config = convert({**settings, "run_dir": str(folder)}, Config, lambda field: f"--{field}")
+        files = _settings(arguments.endpoint, arguments.namespace)
+        print(f"recording {arguments.endpoint} to {folder}/messages-*.mcap; Ctrl-C ends it", flush=True)
+        record(f"mobee_record_{os.getpid()}", config, files)
     except BusUnreachable as error:
         raise UserError(str(error), ENVIRONMENT) from None
-    except (MobeeError, ValidationError) as error:
+    except (MobeeError, ConfigError) as error:
         raise UserError(str(error), BAD_INPUT) from None
     return 0
 

@@ -26,6 +26,7 @@ def record(who: str, config: Config, settings: Mapping[str, bytes] | None = None
     `who`: name of this service on the bus. `settings`: as those of `RecorderNode`. Raises MobeeError or BusUnreachable if the recording
     cannot begin.
     """
+    config.require_folder()
     robot = robot_of(config)
     spare_threads()  # messages arrive one by one: handing each from thread to thread costs more than it
     if not config.everything:  # pictures are larger

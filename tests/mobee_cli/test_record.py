@@ -40,3 +40,10 @@ def test_a_recording_is_not_mixed_with_an_earlier_one(tmp_path: Path, capsys: py
     assert main(["record", "--to", str(tmp_path)]) == 2
     said = capsys.readouterr()
     assert "holds a recording already, messages-0003.mcap" in said.err and "--to" in said.err and not said.out
+
+
+@pytest.mark.parametrize("size", ["inf", "nan", "5"])
+def test_a_size_that_is_not_valid_is_refused_with_its_option(tmp_path: Path, capsys: pytest.CaptureFixture[str], size: str) -> None:
+    assert main(["record", "--to", str(tmp_path), "--largest", size]) == 2
+    said = capsys.readouterr()
+    assert said.err.startswith("mobee record: --largest: ") and len(said.err.splitlines()) == 1 and not said.out

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -59,3 +61,10 @@ def test_messages_that_are_dropped_while_the_disk_is_full_count_as_lost_once(tmp
             until(lambda: recorded() == 20)
             assert lost() == 51
             recorder.end()
+
+
+def test_a_missing_run_dir_is_reported(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "services.recorder", "--run-dir", str(tmp_path / "none"), "--endpoint", "tcp/127.0.0.1:1"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 2
+    assert f"run_dir {tmp_path / 'none'} is not a folder" in done.stderr
