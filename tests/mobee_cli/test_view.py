@@ -33,6 +33,16 @@ def test_a_recording_holds_robot_world_and_contacts(tmp_path: Path, capsys: pyte
     assert {"/robot/bend", "/robot/bend/solids/fore", "/world/ball", "/contacts", "/plots/motors", "/events"} <= shown
 
 
+@pytest.mark.parametrize("most", [1000, 20_000])
+def test_a_recording_that_does_not_fit_on_the_disk_is_an_error(most: int, tmp_path: Path) -> None:
+    robot, saved = robot_file(tmp_path, *ARM.splitlines()), tmp_path / "toy.rrd"
+    code = f"""import resource, sys; from mobee_cli.__main__ import main; resource.setrlimit(resource.RLIMIT_FSIZE, ({most}, {most}))
+sys.exit(main(["view", {str(robot)!r}, "--save", {str(saved)!r}]))"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 3 and done.stdout == "" and "Traceback" not in done.stderr
+    assert f"mobee view: {saved}: the recording cannot be written" in done.stderr
+
+
 def test_a_page_is_served_until_it_is_interrupted(tmp_path: Path) -> None:
     robot = robot_file(tmp_path, *ARM.splitlines())
     command = [sys.executable, "-m", "mobee_cli", "view", str(robot)]
