@@ -76,4 +76,5 @@ def _built(example: Any, path: Path, arguments: argparse.Namespace) -> Any:
         except KeyboardInterrupt:
             if not path.exists():
                 raise
-            raise UserError(f"interrupted at {known}. {path} holds them; the same command resumes.", INTERRUPTED) from None
+            text = f"interrupted at {known}. {path} holds all but the last seconds of it; the same command resumes."
+            raise UserError(text, INTERRUPTED) from None

@@ -422,4 +422,4 @@ def test_an_interrupted_build_prints_how_to_continue(say: Say, tmp_path: Path, m
     monkeypatch.setattr(mobee, "build_roadmap", interrupted, raising=False)
     code, out, err = say("build", "palm-down", "-o", tmp_path / "map.npz")
     assert code == 130 and out == ""
-    assert "interrupted at 30 vertices, 10 open" in err and "the same command resumes" in _flat(err)
+    assert "interrupted at 30 vertices, 10 open" in err and "holds all but the last seconds of it; the same command resumes" in _flat(err)
