@@ -31,6 +31,8 @@ def main() -> int:
     handler = signal.getsignal(signal.SIGINT)
     if handler is signal.default_int_handler:
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C during the imports ends the process without a traceback
+    if "" not in sys.path and not sys.flags.safe_path:
+        sys.path.append("")  # for what users name as module:name, as in the services; last, so that their files hide no module
     from mobee_cli.__main__ import main as run_command
 
     signal.signal(signal.SIGINT, handler)
