@@ -46,6 +46,10 @@ class Model:
         self._hands_of: dict[tuple[str, ...], Hands] = {(): NO_HANDS}  # found so far; the engine compares them by identity
         self._hand_of: dict[str, Hand] = {}
 
+    def __reduce__(self) -> tuple[type[Model], tuple[Robot, World, str]]:
+        """Copy or pickle the robot and the world; `copy.copy` makes a model in the same world, `copy.deepcopy` one in a copy of it."""
+        return Model, (self.robot, self.world, "compiled" if isinstance(self._engine, NativeEngine) else "fcl")
+
     def hands(self, reaching: Reaching) -> Hands:
         """Return a tuple with the hand of each marker that reaches, in the order given: the links whose contacts with targets are ignored.
 

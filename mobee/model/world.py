@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Protocol
 
@@ -52,13 +52,17 @@ class World:
     """A set of named objects around the robot; any thread may edit it while others evaluate, because every edit makes a new snapshot.
 
     Roles of an object: an "obstacle" repels the robot; a "target" repels all links except the hand that reaches for it; a "ghost" is only
-    drawn.
+    drawn. Worlds can be copied (`copy.copy`) and pickled; edits of a copy do not change the original.
     """
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._snapshot = EMPTY
         self._followed: LinkPoses | None = None
+
+    def __reduce__(self) -> tuple[Callable[..., World], tuple[tuple[WorldObject, ...]]]:
+        """Copy or pickle the objects; a copy does not know the present pose of the robot (see `follow`)."""
+        return _world_of, (tuple(self._snapshot.objects.values()),)
 
     @property
     def snapshot(self) -> Snapshot:
@@ -173,6 +177,13 @@ class World:
         if name not in self._snapshot.objects:
             raise UnknownName("world object", name, self._snapshot.objects)
         return self._snapshot.objects[name]
+
+
+def _world_of(objects: tuple[WorldObject, ...]) -> World:
+    world = World()
+    for thing in objects:
+        world._snapshot = extended(world._snapshot, replace(thing))  # replaced, so that arrays that were pickled are protected again
+    return world
 
 
 def link_pose(seen: LinkPoses | None, link: str) -> Array:

@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+import copy
+import pickle
 import threading
 import time
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -286,3 +289,15 @@ def test_every_evaluation_sees_one_world_while_another_thread_floods_it(model):
 def test_a_name_in_place_of_a_robot_or_world_is_refused(model, robot, world, complaint):
     with pytest.raises(mobee.InvalidValue, match=complaint):
         mobee.Model(robot or model.robot, world)
+
+
+@pytest.mark.parametrize("engine", ["compiled", "fcl"])
+def test_a_model_can_be_copied_and_pickled(engine: Literal["compiled", "fcl"]) -> None:
+    model = mobee.Model(planar_arm(), engine=engine)
+    model.world.add("ball", mobee.sphere(0.2), position=(0.5, 0.1, 0.0))
+    wanted = model.evaluate(np.zeros(3)).table
+    assert len(wanted)
+    for other in (copy.copy(model), copy.deepcopy(model), pickle.loads(pickle.dumps(model))):
+        assert np.array_equal(other.evaluate(np.zeros(3)).table.reals, wanted.reals)
+        assert type(other._engine) is type(model._engine)
+    assert copy.copy(model).world is model.world and copy.deepcopy(model).world is not model.world

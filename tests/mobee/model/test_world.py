@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 
@@ -149,3 +152,20 @@ def test_an_object_copies_the_arrays_that_it_is_made_of():
     thing = WorldObject("cup", "sphere", (0.1,), position, rotation)
     position[0] = rotation[0, 0] = 5.0
     assert not thing.position.any() and np.array_equal(thing.rotation, np.eye(3))
+
+
+@pytest.mark.parametrize(
+    "copied", [copy.copy, copy.deepcopy, lambda one: pickle.loads(pickle.dumps(one))], ids=["copy", "deepcopy", "pickle"]
+)
+def test_a_copy_is_a_world_of_its_own(world, copied):
+    world.attach("cup", "hand", ((0.0, 0.0, 0.1), np.eye(3)))
+    world.add("ball", mobee.sphere(0.1), role="target", mass=0.2)
+    other = copied(world)
+    assert list(other.objects) == list(world.objects) == ["cup", "ball"]
+    assert (other.objects["cup"].link, other.objects["ball"].role, other.objects["ball"].mass) == ("hand", "target", 0.2)
+    assert other.snapshot.rows.tobytes() == world.snapshot.rows.tobytes() and other.snapshot.attached == ("cup",)
+    with pytest.raises(ValueError, match="read-only"):
+        other.objects["ball"].position[0] = 1.0
+    other.remove("ball")
+    world.move("ball", position=(1.0, 0.0, 0.0))
+    assert "ball" in world.objects and "ball" not in other.objects
