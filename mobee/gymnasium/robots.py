@@ -135,7 +135,7 @@ class RobotVectorEnv(VectorEnv[Any, Any, Any]):
         self.num_envs, self.render_mode, self._most = num_envs, None, max_episode_steps
         self.single_observation_space, self.single_action_space = observations, actions
         self.observation_space, self.action_space = batch_space(observations, num_envs), batch_space(actions, num_envs)
-        self._rngs = [np.random.default_rng(number) for number in range(num_envs)]
+        self._rngs = [np_random()[0] for _ in range(num_envs)]  # without a seed, each vector differs, as separate environments do
         self._steps = np.zeros(num_envs, dtype=np.intp)
         self._over = np.zeros(num_envs, dtype=bool)
 

@@ -91,6 +91,11 @@ def test_each_robot_of_a_vector_is_an_environment_of_its_own() -> None:
             assert infos["is_success"][number] == info["is_success"]
 
 
+def test_vectors_without_a_seed_differ_and_so_do_their_robots() -> None:
+    goals = np.concatenate([ReachVectorEnv(2).reset()[0]["desired_goal"] for _ in range(2)])
+    assert len(np.unique(goals, axis=0)) == 4
+
+
 def test_a_vector_begins_with_the_goals_of_its_options() -> None:
     vector = gymnasium.make_vec("MoBeE/Reach-v0", num_envs=2, period=0.02)
     goals = np.array([[-0.3, 0.1, 0.1], [-0.2, 0.2, 0.0]])
