@@ -26,8 +26,11 @@ def add_endpoint(parser: argparse.ArgumentParser) -> None:
 def endpoint(text: str) -> str:
     """Check the address of a router that a user gives, and return it. Raises ArgumentTypeError if Zenoh cannot use it."""
     protocol, _, place = text.partition("/")
-    if not place or (protocol == "tcp" and not place.rpartition(":")[2].isdecimal()):
-        raise argparse.ArgumentTypeError(f"{text!r} is no address of a router: write tcp/HOST:PORT, such as {DEFAULT_ENDPOINT}")
+    number = place.rpartition(":")[2]
+    if not place or (protocol in ("tcp", "tls") and not (number.isdecimal() and 0 < int(number) < 65536)):
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is no address of a router: write tcp/HOST:PORT with a port from 1 to 65535, such as {DEFAULT_ENDPOINT}"
+        )
     return text
 
 

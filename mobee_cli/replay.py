@@ -13,7 +13,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from experiments.kit.command_line import positive_number, positive_whole
-from experiments.kit.live.launch import free_endpoint
+from experiments.kit.live.launch import free_endpoint, free_port
 from mobee.errors import MobeeError
 from mobee_cli.errors import UserError
 from services.common.exit_codes import BAD_INPUT, ENVIRONMENT, FAILED, OK
@@ -42,8 +42,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     what.add_argument("--messages", action="store_true", help="play the recorded messages, also where the run had a monitor")
     parser.add_argument("--ticks", type=positive_whole, default=sys.maxsize, metavar="N", help="--into: end after tick N")
     parser.add_argument("--speed", type=positive_number, default=1.0, metavar="X", help="of recorded messages (default: real time)")
-    parser.add_argument("--port", type=int, default=9091, help="port of the page (default: %(default)s)")
+    parser.add_argument("--port", type=_port, default=9091, help="port of the page, 0: a free one (default: %(default)s)")
     parser.add_argument("--json", action="store_true", help="print the result of a comparison as JSON")
+
+
+def _port(text: str) -> int:
+    if not text.isdecimal() or int(text) > 65535:
+        raise argparse.ArgumentTypeError(f"{text!r} is no port: write a whole number from 0 (a free port) to 65535")
+    return int(text)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -127,10 +133,11 @@ def _play(arguments: argparse.Namespace) -> None:
     if find_spec("rerun") is None:
         raise UserError(_NO_PAGE, ENVIRONMENT)
     with tempfile.TemporaryDirectory(prefix="mobee-replay-") as folder:
-        player = Player(Recording(arguments.run), arguments.port, Path(folder))
+        port = arguments.port or free_port()
+        player = Player(Recording(arguments.run), port, Path(folder))
         with player.stage.open(free_endpoint()) as stage:
             stage.start()
-            _say(arguments.run, f"http://127.0.0.1:{arguments.port}/")
+            _say(arguments.run, f"http://127.0.0.1:{port}/")
             player.play(arguments.speed)
             print("That was the last message; the page stays.", flush=True)
             while True:

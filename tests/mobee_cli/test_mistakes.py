@@ -132,7 +132,10 @@ MISTAKES = (
     Mistake("launch kinematic --set services.robt_sim.rate=50", ("has no services.robt_sim. Did you mean 'robot_sim'?",)),
     Mistake("launch kinematic --duration ten", ("'ten' is not a positive number",)),
     Mistake("launch kinematic --ticks 10", ("a number of ticks is exact in lockstep only: set shared.mode=lock",)),
-    Mistake("launch kinematic --endpoint 127.0.0.1:7447", ("write tcp/HOST:PORT, such as tcp/127.0.0.1:7447",)),
+    Mistake("launch kinematic --endpoint 127.0.0.1:7447", ("write tcp/HOST:PORT", "such as tcp/127.0.0.1:7447")),
+    Mistake("estop --endpoint tcp/127.0.0.1:74470", ("'tcp/127.0.0.1:74470' is no address of a router", "a port from 1 to 65535")),
+    Mistake("status --endpoint tls/127.0.0.1", ("'tls/127.0.0.1' is no address of a router",)),
+    Mistake("replay run --port 90910", ("'90910' is no port", "0 (a free port) to 65535")),
     Mistake(
         "launch kinematic --runs arm.urdf/runs --endpoint {endpoint}",
         ("cannot write arm.urdf/runs: Not a directory", "with --runs"),
