@@ -9,12 +9,13 @@ excluded if
 - they are fields of the same part: an arm's own fields overlap wherever the arm bends, and its joint limits keep its solids apart.
 
 Joined links: a cluster is a group of joints, each within 5 cm of its parent joint or of a joint on the same link, such as those of the
-shoulder, the elbow with pro-supination, the wrist, the neck or the torso. A cluster connects the link that carries it and all links that
-its joints move. The shapes of these links overlap at the cluster, since each fills the whole cluster. So each pair of these links counts as
-joined: chest with the whole shoulder and upper arm, upper arm with elbow and forearm, forearm with wrist and hand. So hands and forearms
-are tested against torso, head and the other arm. A chain of links shorter than 5 cm is one cluster too, so that none of its links are
-tested against each other: `mobee check` warns of clusters that are long (`mobee.check.touching.long_clusters`). If a robot file has
-adjacency="listed", only pairs in <ignore> tags are excluded, so that `write_xml` can keep the pairs of any robot.
+shoulder, the elbow with pro-supination, the wrist, the neck or the torso. A slide of more than 5 cm is alone in its cluster. A cluster
+connects the link that carries it and all links that its joints move. The shapes of these links overlap at the cluster, since each fills the
+whole cluster. So each pair of these links counts as joined: chest with the whole shoulder and upper arm, upper arm with elbow and forearm,
+forearm with wrist and hand. So hands and forearms are tested against torso, head and the other arm. A chain of links shorter than 5 cm is
+one cluster too, so that none of its links are tested against each other: `mobee check` warns of clusters that are long
+(`mobee.check.touching.long_clusters`). If a robot file has adjacency="listed", only pairs in <ignore> tags are excluded, so that
+`write_xml` can keep the pairs of any robot.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ def joined_links(joints: Sequence[Joint]) -> dict[LinkPair, str]:
     """Return the pairs of links that one cluster of joints connects, and which are therefore not tested for contacts, with the reasons.
 
     A cluster is a group of joints that are close together: each joint after the first is less than CLUSTER (5 cm) from its parent joint, or
-    from a joint on the same link.
+    from a joint on the same link, and none slides farther than that.
     """
     clusters = joint_clusters(joints)
     joined: dict[LinkPair, str] = {}
@@ -49,11 +50,16 @@ def joined_links(joints: Sequence[Joint]) -> dict[LinkPair, str]:
     return joined
 
 
+def slides_far(joint: Joint) -> bool:
+    """Return whether a joint slides by more than CLUSTER (5 cm), so that the links that it connects do not stay close together."""
+    return joint.kind == "prismatic" and float(np.ptp(joint.limits)) > CLUSTER
+
+
 def joint_clusters(joints: Sequence[Joint]) -> list[list[int]]:
     """Return the clusters of joints, each as a list of indices of joints.
 
     A joint is compared with its parent joint, then with earlier joints on the same link. It joins the cluster of the first of these that is
-    nearer than CLUSTER (5 cm); if there is none, it starts a new cluster.
+    nearer than CLUSTER (5 cm); if there is none, it starts a new cluster. A joint that slides far (`slides_far`) is a cluster of its own.
     """
     points = np.array([joint.point for joint in joints]).reshape(-1, 3)
     beside: dict[int, list[int]] = {}  # link -> its joints
@@ -61,9 +67,9 @@ def joint_clusters(joints: Sequence[Joint]) -> list[list[int]]:
     clusters: list[list[int]] = []
     for index, joint in enumerate(joints):
         before = ([joint.parent - 1] if joint.parent else []) + beside.setdefault(joint.parent, [])
-        near = np.flatnonzero(np.linalg.norm(points[before] - points[index], axis=1) < CLUSTER)
-        if len(near):
-            home.append(home[before[int(near[0])]])
+        near = [k for k in before if np.linalg.norm(points[k] - points[index]) < CLUSTER and not slides_far(joints[k])]
+        if near and not slides_far(joint):
+            home.append(home[near[0]])
         else:
             home.append(len(clusters))
             clusters.append([])

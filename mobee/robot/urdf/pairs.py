@@ -3,7 +3,8 @@
 
 Two shapes on different links are tested, except
 - shapes of adjacent links, unless the SRDF enables them. Links are adjacent if one joint connects them, or a chain of joints at one place
-  (within 5 cm), such as a wrist that is written as three joints, if the links between have no solid (`adjacent_links`);
+  (within 5 cm, and no slide of a longer range), such as a wrist that is written as three joints, if the links between have no solid
+  (`adjacent_links`);
 - shapes of links (of the URDF, before fixed joints are merged) whose tests the SRDF disables;
 - fields of one part. But if the SRDF does not define the parts, fields of one part that are far apart are tested (`far_apart`).
 
@@ -20,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mobee.arrays import Array, Ints
-from mobee.robot.pairs import CLUSTER
+from mobee.robot.pairs import CLUSTER, slides_far
 from mobee.robot.robot import Joint, LinkPair, Shape
 from mobee.robot.urdf.srdf import NamePair, Srdf
 
@@ -47,7 +48,8 @@ def adjacent_links(joints: Sequence[Joint], shapes: Sequence[Shape]) -> dict[Lin
     """Return the pairs of adjacent links (indices), each with the reason as text.
 
     Two links are adjacent if one joint connects them. They are adjacent too if a chain of at most six joints connects them, all joints are
-    within 5 cm of the last one, and the links between have no solid. `joints`, `shapes`: of the robot.
+    within 5 cm of the last one, none of them slides by more than 5 cm, and the links between have no solid. `joints`, with their limits,
+    `shapes`: of the robot.
     """
     solid = {shape.link for shape in shapes if shape.role == "solid"}
     found: dict[LinkPair, str] = {}
@@ -57,6 +59,8 @@ def adjacent_links(joints: Sequence[Joint], shapes: Sequence[Shape]) -> dict[Lin
         while (
             0 < link
             and link not in solid
+            and not slides_far(joint)
+            and not slides_far(joints[link - 1])
             and between < MOST_BETWEEN
             and float(np.linalg.norm(joints[link - 1].point - joint.point)) < CLUSTER
         ):

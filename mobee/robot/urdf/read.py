@@ -99,12 +99,13 @@ def _finish(root: Node, name: str, tree: Tree, skeleton: Skeleton, srdf: Srdf, o
             where["home", motor.name] = _place(home.state[stated[0]][0])
     body = _read_body(tree, skeleton, motors, options, where)
     notes = [node for node in root if node.tag == "mobee"]
-    rules = PairRules(skeleton.index, adjacent_links(skeleton.joints, body.shapes), srdf, _own_fields(notes, parts, srdf))
-    solid_pairs, field_pairs = (shape_pairs(skeleton.joints, body.shapes, body.owners, role, rules) for role in ("solid", "field"))
+    joints = tuple(_limited(skeleton.joints, motors))
+    rules = PairRules(skeleton.index, adjacent_links(joints, body.shapes), srdf, _own_fields(notes, parts, srdf))
+    solid_pairs, field_pairs = (shape_pairs(joints, body.shapes, body.owners, role, rules) for role in ("solid", "field"))
     robot = Robot(
         name=name,
         links=tuple(skeleton.links),
-        joints=tuple(_limited(skeleton.joints, motors)),
+        joints=joints,
         motor_table=motors,
         parts=parts,
         markers={marker.name: marker for marker in read_markers(tree, skeleton, where)},

@@ -3,6 +3,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from mobee.robot.load import load_robot
 from mobee.robot.pairs import joined_links
 from mobee.robot.robot import Robot
@@ -34,6 +36,21 @@ def test_joints_that_are_one_place_join_all_links_that_meet_there(tmp_path: Path
     robot = chain(tmp_path, steps=(0.3, 0.04, 0.04))
     assert pairs_of(robot) == set()
     assert joined_links(robot.joints).keys() == {frozenset(pair) for pair in ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))}
+
+
+@pytest.mark.parametrize(("span", "pairs"), [(0.5, {"b1", "b2"}), (0.04, set())])
+def test_a_slide_that_leads_away_from_its_place_is_no_part_of_it(tmp_path: Path, span: float, pairs: set[str]) -> None:
+    ball = '<sphere name="s{}" radius="0.01"/>'
+    robot = read_robot(
+        robot_file(
+            tmp_path,
+            f'<bodypart name="arm">{ball.format("b")}<motor name="lift" unit="m" minPos="0" maxPos="{span}"><joint z="1" type="prismatic">',
+            f'{ball.format(0)}<motor name="pan" minPos="-90" maxPos="90"><joint z="1">{ball.format(1)}',
+            f'<motor name="tilt" minPos="-90" maxPos="90"><joint y="1">{ball.format(2)}</joint></motor></joint></motor>',
+            "</joint></motor></bodypart>",
+        )
+    )
+    assert pairs_of(robot) == pairs
 
 
 def test_a_hand_is_not_tested_against_itself(tmp_path: Path) -> None:

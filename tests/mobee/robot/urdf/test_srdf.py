@@ -6,8 +6,11 @@ from pathlib import Path
 import pytest
 
 from mobee.errors import RobotFileError
+from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
 from mobee.robot.urdf.read import UrdfOptions, read_urdf
+from mobee.robot.urdf.write import write_urdf
+from tests.mobee.robot.same_robot import assert_same_pairs
 from tests.mobee.robot.urdf_files import srdf_file, urdf_file
 
 BODY = '<link name="{0}"><collision><geometry><sphere radius="0.01"/></geometry></collision></link>'
@@ -129,6 +132,16 @@ def test_links_without_solids_at_one_place_count_as_one_joint(tmp_path: Path) ->
     apart = read_urdf(urdf_file(tmp_path, *wrist, *joints[:2], joints[2].format("0.5")))
     assert reason(apart, "a", "b") is None
     assert pairs_of(apart) == {frozenset(("a", "b"))}
+
+
+@pytest.mark.parametrize(("span", "tested"), [(0.6, True), (0.01, False)])
+def test_a_slide_that_leads_away_from_its_place_does_not_count_as_one_joint(tmp_path: Path, span: float, tested: bool) -> None:
+    gantry = (BODY.format("a"), '<link name="x"/><link name="y"/>', BODY.format("b"))
+    joint = '<joint name="{0}" type="prismatic"><parent link="{1}"/><child link="{2}"/><limit lower="0" upper="{3}"/></joint>'
+    slides = [joint.format("j1", "a", "x", 0.01), joint.format("j2", "x", "y", span), joint.format("j3", "y", "b", 0.01)]
+    robot = read_urdf(urdf_file(tmp_path, *gantry, *slides))
+    assert pairs_of(robot) == ({frozenset(("a", "b"))} if tested else set())
+    assert_same_pairs(robot, load_robot(write_urdf(robot, tmp_path / "written.urdf")))
 
 
 def test_an_srdf_elsewhere_is_named_by_an_option(tmp_path: Path) -> None:
