@@ -138,7 +138,7 @@ class OutcomeRuns:
         goal = int(self._goals[state, action])
         to_goal = [(int(one), int(other)) for one, other in np.argwhere(self._goals == goal)]
         back = [(goal, int(other)) for other in np.flatnonzero(self._goals[goal] == state)]
-        for near in [*to_goal, *back]:
+        for near in dict.fromkeys([*to_goal, *back]):  # both, if an action aims at its own state
             known = self._runs.get(near)
             if known is None or near == (state, action):
                 continue

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from mobee.errors import InvalidValue, UnknownName
 from mobee.learning.agent import CuriousAgent
+from mobee.learning.discrete import DiscreteSpace
 from mobee.learning.runs import GOAL, HAZARDS, NEGLIGIBLE, OTHER, STAY, OutcomeRuns
 from mobee.learning.tabular import TabularPlant, ideal
 from mobee.learning.transitions import TransitionModel
@@ -45,6 +46,13 @@ def test_counts_are_those_expected_over_all_sequences_of_changes(outcomes):
     for outcome in outcomes:
         runs.observe(0, 0, outcome, 3)
     assert runs.counts(0, 0, 3) == pytest.approx(posterior(outcomes), abs=len(outcomes) ** 2 * NEGLIGIBLE)
+
+
+def test_a_related_action_is_suspected_once_where_actions_aim_at_their_own_state():
+    runs = OutcomeRuns(DiscreteSpace(3, 2))
+    for action in 2 * [0, 1, 0, 1, 0, 1]:
+        runs.observe(0, action, 0, 3)
+    assert runs.observe(0, 0, 2, 3) == [(0, 1)]
 
 
 def test_what_follows_is_what_an_observation_makes():
