@@ -47,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = "marker that reaches (default: the palm nearer to the target at home; without palms, the end that the most motors move)"
     parser.add_argument("--marker", metavar="NAME", help=text)
     parser.add_argument("--part", help="part that reaches (default: the part with the most motors that move the marker)")
-    parser.add_argument("--radius", type=float, default=RADIUS, metavar="R", help="radius of the target [m] (default: %(default)g)")
+    parser.add_argument("--radius", type=float, metavar="R", help=f"radius of the target of --target [m] (default: {RADIUS:g})")
     where = (
         "bring the marker to the centre or to the surface of the target (default: centre for --target, surface for --object and --facing)"
     )
@@ -66,6 +66,9 @@ def run(arguments: argparse.Namespace) -> int:
     """Run `mobee reach`: reach for the target, print the result, and return the exit code (0: reached, 1: not reached)."""
     if arguments.aim is None:
         arguments.aim = "surface" if arguments.object is not None or arguments.facing else "centre"
+    if arguments.object is not None and arguments.radius is not None:
+        raise UserError(f"--radius {arguments.radius:g}: only valid with --target; an object has its own radius", BAD_INPUT)
+    arguments.radius = RADIUS if arguments.radius is None else arguments.radius
     try:
         with _setup(arguments) as setup:
             result = _reach(arguments, setup)

@@ -124,6 +124,7 @@ def test_a_run_that_does_not_fit_is_refused_in_one_line(learned: Path, capsys: p
             "right_arm does not move the marker 'left_palm'. Valid: right_elbow",
         ),
         (["--object", "balll"], "Did you mean 'ball'?"),
+        (["--object", "ball", "--radius", "0.1"], "--radius 0.1: only valid with --target"),
     ],
 )
 def test_an_invalid_reach_target_is_refused_in_one_line(words: list[str], says: str, capsys: pytest.CaptureFixture[str]) -> None:
