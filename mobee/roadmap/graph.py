@@ -155,6 +155,7 @@ def components(count: int, edges: Ints) -> Ints:
     return found
 
 
+MOST_NAMED = 3  # contacts in an error
 ENTRIES, EXITS = 24, 8  # numbers of vertices that are tried as the first and the last of a path
 MAX_LAZY_SEARCHES = 30  # after so many searches all unchecked edges are checked at once
 
@@ -190,8 +191,10 @@ def free_path(model: Model, roads: Graph, edges: Ints, start: Array, to_enter: A
             if (path := search.path(first, goal)) is not None:
                 return path
     if not entered:
+        touch = [f"{one.first} and {one.second}" for one in model.evaluate(start).contacts if one.kind == "solid"]
         raise MobeeError(
-            f"no path without contacts: the straight lines from the start to the {ENTRIES} nearest poses of the map all have contacts."
+            f"no path without contacts: the straight lines from the start to the {ENTRIES} nearest poses of the map all have contacts"
+            + (f", since {', '.join(touch[:MOST_NAMED])} touch in the start itself." if touch else ".")
         )
     raise MobeeError(
         f"no path without contacts: {len(search.touching)} of {len(edges)} edges have contacts, and the other edges do not connect the "

@@ -46,11 +46,17 @@ class Roadmap:
     graph: Graph = field(init=False)
 
     def __post_init__(self) -> None:
-        """Check that the arrays fit together, and make `graph`; raise InvalidValue if they do not fit."""
+        """Check that the arrays fit together and are finite, and make `graph`; raise InvalidValue otherwise."""
         n, m = len(self.model.robot.motors), len(self.spacing)
         if self.q.shape != (len(self.q), n) or self.y.shape != (len(self.q), m) or self.edges.shape != (len(self.edges), 2):
             shapes = f"q {self.q.shape}, y {self.y.shape}, edges {self.edges.shape}"
             raise InvalidValue(f"a roadmap of {shapes}; it must be q (V, {n}), y (V, {m}) and edges (E, 2).")
+        for name, values in (("q", self.q), ("y", self.y)):
+            if not np.isfinite(values).all():
+                vertex = int(np.argwhere(~np.isfinite(values))[0, 0])
+                raise InvalidValue(f"{name} of vertex {vertex} has numbers that are not finite; all must be.")
+        if not (np.isfinite(self.spacing).all() and (self.spacing > 0.0).all()):
+            raise InvalidValue(f"spacing is {self.spacing.tolist()}; all numbers must be finite and above 0.")
         if len(self.edges) and not (0 <= self.edges.min() and self.edges.max() < len(self.q)):
             raise InvalidValue(f"edges name the vertices {self.edges.min()} to {self.edges.max()}; valid are 0 to {len(self.q) - 1}.")
         if not (self.edges[:, 0] < self.edges[:, 1]).all():

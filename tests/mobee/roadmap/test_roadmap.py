@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -95,6 +96,28 @@ def test_arrays_that_do_not_belong_together_are_refused() -> None:
     for q, edges in ((trm.q[:-1], trm.edges), (trm.q[:, 1:], trm.edges), (trm.q, trm.edges + 10), (trm.q, trm.edges[:, ::-1])):
         with pytest.raises(InvalidValue):
             Roadmap(trm.model, q, trm.y, edges, SPACING, {})
+
+
+@pytest.mark.parametrize(
+    ("changed", "text"),
+    [
+        ({"q": np.nan}, "q of vertex 7 has numbers that are not finite"),
+        ({"y": np.inf}, "y of vertex 7 has numbers that are not finite"),
+        ({"spacing": 0.0}, "spacing is .* above 0"),
+        ({"spacing": np.nan}, "spacing is .* finite"),
+    ],
+)
+def test_a_map_with_numbers_that_are_none_is_refused(changed: dict[str, float], text: str, tmp_path: Path) -> None:
+    trm = square(table())
+    arrays = {"q": trm.q.copy(), "y": trm.y.copy(), "edges": trm.edges, "spacing": trm.spacing.copy()}
+    for name, value in changed.items():
+        arrays[name].reshape(-1)[0 if name == "spacing" else 7 * arrays[name].shape[1]] = value
+    with pytest.raises(InvalidValue, match=text):
+        replace(trm, **arrays)
+    trm.save(tmp_path / "map.npz")
+    write(tmp_path / "map.npz", arrays, read(tmp_path / "map.npz")[1])
+    with pytest.raises(MobeeError, match=f"damaged: {text}"):
+        load_roadmap(tmp_path / "map.npz")
 
 
 def test_a_map_read_back_is_the_map(tmp_path: Path) -> None:
