@@ -6,6 +6,7 @@ from __future__ import annotations
 import logging
 import os
 import signal
+import sys
 import threading
 import time
 import traceback
@@ -22,7 +23,7 @@ from experiments.kit.cells import Cell, Work
 from mobee.errors import MobeeError
 
 _THREAD_LIMITS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")  # set here too: not every caller comes from mobee_cli
-_END_TIMEOUT = 2.0  # s, for a process to end
+_END_TIMEOUT = 40.0  # s, for a process to end: its cell may first have to stop a live system, which takes up to 30 s
 
 
 def cores() -> int:
@@ -95,7 +96,8 @@ class _Worker:
 
 
 def _serve(work: Work, cells: Connection) -> None:
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    with _signals_of_cells():
+        threading.Thread(target=_end_with_parent, daemon=True).start()  # its signals stay blocked: this thread must get them
     while True:
         try:
             cell = cells.recv()
@@ -108,10 +110,28 @@ def _serve(work: Work, cells: Connection) -> None:
             cells.send(Done(cell, done.seconds, None, f"what it returned cannot be sent to another process: {error}"))
 
 
+@contextmanager
+def _signals_of_cells() -> Iterator[None]:
+    """Let this process end by SystemExit on SIGTERM, so that a cell stops the processes that it has started, and do nothing on Ctrl-C.
+
+    Inside the context both signals are blocked.  Afterwards they are not, because the processes that a cell starts inherit this.
+    """
+    both = {signal.SIGTERM, signal.SIGINT}
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_BLOCK, both)
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
+    signal.signal(signal.SIGINT, lambda *_: None)
+    yield
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, both)
+
+
 def _end_with_parent() -> None:
     parent = parent_process()
     if parent is not None:
         parent.join()
+        os.kill(os.getpid(), signal.SIGTERM)
+        time.sleep(_END_TIMEOUT)
         os._exit(1)
 
 

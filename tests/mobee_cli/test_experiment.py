@@ -171,7 +171,8 @@ def test_a_run_refused_after_its_first_record_keeps_it(tmp_path, monkeypatch):
     assert (folder / "records.csv").read_text() == "depth\n1.0\n"
 
 
-def test_ctrl_c_leaves_the_finished_records_and_prints_how_to_continue(tmp_path):
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+def test_an_interruption_leaves_the_finished_records_and_prints_how_to_continue(tmp_path, how):
     argv = [sys.executable, "-m", "mobee_cli", "experiment", "run", "model-throughput", "--robots", "katana", "--runs", str(tmp_path)]
     with subprocess.Popen(argv, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         give_up = time.monotonic() + 120.0
@@ -179,7 +180,7 @@ def test_ctrl_c_leaves_the_finished_records_and_prints_how_to_continue(tmp_path)
             assert process.poll() is None
             assert time.monotonic() < give_up
             time.sleep(0.1)
-        process.send_signal(signal.SIGINT)
+        process.send_signal(how)
         out, err = process.communicate(timeout=30.0)
     assert process.returncode == 130
     (folder,) = tmp_path.iterdir()

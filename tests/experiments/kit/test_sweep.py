@@ -19,7 +19,7 @@ from experiments.kit.sweep import CellsFailed, Condition, Sweep, TimeLeft, group
 from mobee.errors import InvalidValue
 from mobee.roadmap.ompl import OmplMissing
 from tests.experiments.finished_cells import finished
-from tests.experiments.kit.toy_sweep import cells, options, useless, work
+from tests.experiments.kit.toy_sweep import cells, options, signals_of_a_child, useless, work
 
 
 def conditions(arguments):
@@ -85,6 +85,11 @@ def test_every_cell_is_run_and_read_back(tmp_path, jobs):
     values = found["toy-s2"].values
     assert values["square"] == 4 and values["nested"] == {"pi": 3.5}
     assert np.array_equal(values["row"], [0, 1])
+
+
+def test_a_process_that_a_cell_starts_can_be_interrupted(tmp_path):
+    run_cells(signals_of_a_child, cells(2), tmp_path, options(str(tmp_path), "--jobs", "2"))
+    assert [one.values["said"] for one in load_cells(tmp_path).values()] == ["True 0", "True 0"]
 
 
 def test_finished_cells_are_not_repeated(tmp_path):
@@ -183,8 +188,8 @@ def test_a_copied_file_is_not_a_second_cell(tmp_path):
         load_cells(tmp_path)
 
 
-def sweep(folder: Path, seconds: float) -> subprocess.Popen[str]:
-    command = [sys.executable, "-m", "tests.experiments.kit.toy_sweep", str(folder), "--seeds", "6", "--jobs", "2"]
+def sweep(folder: Path, seconds: float, *more: str) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "tests.experiments.kit.toy_sweep", str(folder), "--seeds", "6", "--jobs", "2", *more]
     return subprocess.Popen(
         [*command, "--seconds", str(seconds)], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
     )
@@ -207,6 +212,16 @@ def test_a_killed_sweep_continues_after_its_finished_cells(tmp_path, how):
     done_after = (tmp_path / "log").read_text().split()[::2][len(done_before) :]
     assert not {f"{name}.npz" for name in done_after} & set(finished)
     assert all((tmp_path / "cells" / name).stat().st_mtime_ns == when for name, when in finished.items())
+
+
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+def test_the_cells_of_a_killed_sweep_give_back_what_they_hold(tmp_path, how):
+    """As a cell that has started a live system."""
+    process = sweep(tmp_path, 0.0, "--holds", str(tmp_path / "held"))
+    wait_until(lambda: len(list(tmp_path.glob("held-*"))) == 2)
+    os.killpg(process.pid, how) if how == signal.SIGINT else process.send_signal(how)
+    process.communicate(timeout=30)
+    assert not list(tmp_path.glob("held-*"))
 
 
 def resume_here(folder: Path) -> tuple[str, str]:
