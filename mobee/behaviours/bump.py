@@ -8,6 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from mobee.arrays import Array
+from mobee.control.forces import checked
+from mobee.errors import InvalidValue
 from mobee.model.masses import gravity_torque
 from mobee.robot.robot import Robot
 
@@ -27,8 +29,13 @@ class BumpWatch:
     def __init__(self, robot: Robot, motors: Sequence[str], threshold: float = THRESHOLD) -> None:
         """Watch the named motors, such as those of the shoulder; `threshold`: change of the torques that counts as a bump [N m].
 
-        The change is the Euclidean norm over the watched motors.
+        The change is the Euclidean norm over the watched motors. Raises UnknownName for an unknown motor, and InvalidValue without a motor
+        or for a threshold that is not above 0.
         """
+        if not len(motors):
+            raise InvalidValue("motors: none is named; name those whose torques show a bump, such as the shoulder's")
+        if not 0.0 < threshold < np.inf:
+            raise InvalidValue(f"threshold {threshold} N m: must be a finite torque above 0")
         self._robot, self._threshold = robot, threshold
         self._columns = np.array([robot.motor_index(name) for name in motors])
         self.begin()
@@ -42,8 +49,13 @@ class BumpWatch:
         """Take the next measurement and return whether the limb has bumped into something.
 
         It has if the torques that gravity does not explain have changed by more than the threshold in four measurements in a row. `q`: (n,)
-        rad, positions. `torques`: (n,) N m. `dt`: time since the last call [s]. In the first 1.2 s of a motion no bump is detected.
+        rad, positions. `torques`: (n,) N m. `dt`: time since the last call [s]. In the first 1.2 s of a motion no bump is detected. Raises
+        InvalidValue for a wrong shape, and for numbers that are not finite.
         """
+        count = len(self._robot.motors)
+        q, torques = checked("q", q, count), checked("torques", torques, count)
+        if not np.isfinite(dt):
+            raise InvalidValue(f"dt {dt} s: must be a finite time")
         unexplained = (torques - gravity_torque(self._robot, q))[self._columns]
         self._time += dt
         if self._mean is None or self._time < START:

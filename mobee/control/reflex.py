@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 
 from mobee.arrays import Array
+from mobee.control.forces import checked
 from mobee.control.law import stack_clauses
 from mobee.errors import InvalidValue
 from mobee.model.pose import Pose
@@ -261,8 +262,9 @@ class Reflex:
         `q`: (n,) rad, measured pose. `violations`: the violations of this pose. The result depends on the state after this tick (see the
         class). "forward": None, because the client commands the robot. "brake": the pose in which braking began. "rewind": the next pose on
         the path back along the recorded poses; in one tick each motor moves at most by `max_velocity` * `dt`. "dead" and "stuck": the
-        same pose as in the tick before.
+        same pose as in the tick before. Raises InvalidValue if q has another shape or is not finite; then nothing changes.
         """
+        q = checked("q", q, len(self._max_step))
         violated, recovery = self._judge(violations), self.recovery
         if self.state == "forward" or recovery is None:
             if not violated:

@@ -175,6 +175,24 @@ def test_a_bump_is_a_jump_of_what_gravity_does_not_explain(jump: float, ticks: i
     assert not watch.note(home, torques(0.0), DT)
 
 
+@pytest.mark.parametrize("wrong", [{"q": np.nan}, {"torques": np.nan}, {"dt": np.nan}])
+def test_a_measurement_that_is_not_finite_is_refused_and_bumps_are_still_detected(wrong: dict[str, float]) -> None:
+    watch, given = BumpWatch(robot(), WATCHED), {"q": robot().home, "torques": torques(0.0), "dt": DT}
+    for _ in range(round(START / DT) + 20):
+        watch.note(**given)
+    with pytest.raises(mobee.InvalidValue, match=next(iter(wrong))):
+        watch.note(**given | {name: value + 0.0 * given[name] for name, value in wrong.items()})
+    assert any([watch.note(robot().home, torques(1.2 * THRESHOLD), DT) for _ in range(TICKS)])
+
+
+def test_a_watch_that_could_never_detect_a_bump_is_refused() -> None:
+    with pytest.raises(mobee.InvalidValue, match="none is named"):
+        BumpWatch(robot(), [])
+    for threshold in (0.0, -1.0, np.nan, np.inf):
+        with pytest.raises(mobee.InvalidValue, match="threshold"):
+            BumpWatch(robot(), WATCHED, threshold)
+
+
 def test_torques_that_change_slowly_or_at_the_start_are_no_bump() -> None:
     watch, home = BumpWatch(robot(), WATCHED), robot().home
     assert not any([watch.note(home, torques(5.0 * (k < 100)), DT) for k in range(150)])

@@ -49,6 +49,15 @@ def test_a_rewind_that_would_not_move_is_refused(velocity: float) -> None:
         Reflex(quick(), DT, np.array([1.0, velocity]))
 
 
+@pytest.mark.parametrize("q", [np.array([0.0, np.nan]), np.zeros(3), np.zeros((1, 2))], ids=["nan", "long", "batch"])
+def test_a_pose_that_is_none_is_not_recorded(q: np.ndarray) -> None:
+    """Else the robot would retrace it."""
+    reflex = Reflex(quick(), DT, FAST)
+    with pytest.raises(InvalidValue, match=r"q.*2 finite numbers"):
+        reflex.tick(q, ())
+    assert reflex.recorded == 0
+
+
 def test_the_robot_retraces_its_path_to_the_waypoint() -> None:
     reflex = Reflex(quick(), DT, FAST)
     walk(reflex, 0, 1)
