@@ -33,7 +33,7 @@ class Range:
     def holds(self, value: float | np.integer | np.floating) -> bool:
         """Return whether a number is finite and within all bounds."""
         return bool(
-            np.isfinite(value)
+            (isinstance(value, int) or np.isfinite(value))  # NumPy has no whole number of 2^64 or more
             and (self.ge is None or value >= self.ge)
             and (self.gt is None or value > self.gt)
             and (self.le is None or value <= self.le)

@@ -89,6 +89,12 @@ def test_values_are_checked_when_settings_are_made(make, options, message):
         make(**options)
 
 
+@pytest.mark.parametrize("seed", [2**63, 2**64, 10**400])
+def test_a_seed_may_be_any_whole_number(seed):
+    assert curious(seed=seed).settings["seed"] == reacher(seed=seed).settings["seed"] == seed
+    curious(seed=seed, explorer="posterior_sampling").run(3)
+
+
 def test_numbers_of_numpy_are_recorded_as_plain_ones(tmp_path):
     options = {"seed": np.int64(3), "discount": np.float32(0.5), "relative": np.bool_(False), "goal": [2], "goal_weight": np.float32(0.25)}
     with TransitionStore(tmp_path / "run.sqlite", "torso") as store:
