@@ -282,8 +282,10 @@ class Tracker:
             turned: rad by which the gaze has rotated since the last look.
 
         Raises:
-            InvalidValue: the time is not later than that of the last look.
+            InvalidValue: the time is not later than that of the last look, or a number is not finite; then nothing changes.
         """
+        if not (np.isfinite([t, turned]).all() and all(np.isfinite(one.position).all() for one in places)):
+            raise InvalidValue(f"a look at {t} s, turned by {turned} rad, at {[one.position.tolist() for one in places]} m: must be finite")
         if t <= self._t:
             raise InvalidValue(f"a look at {t:.3f} s after one at {self._t:.3f} s: looks must be in the order of their times")
         self._t = t

@@ -190,3 +190,14 @@ def test_looks_come_in_their_order() -> None:
     tracker.update(1.0, [])
     with pytest.raises(InvalidValue, match="in the order"):
         tracker.update(1.0, [])
+
+
+@pytest.mark.parametrize("name", ["t", "turned", "place"])
+def test_a_look_that_is_not_finite_is_refused_and_loses_no_object(name: str, rng: np.random.Generator) -> None:
+    tracker = Tracker(THINGS)
+    run(tracker, {0: (BALL, line(tuple(AT), tuple(AT), 6))}, rng)
+    wrong = {"t": np.nan if name == "t" else 1.0, "turned": np.nan if name == "turned" else 0.0}
+    with pytest.raises(InvalidValue, match="must be finite"):
+        tracker.update(places=[look(BALL, AT * (np.nan if name == "place" else 1.0), rng)], **wrong)
+    tracker.update(1.0, [look(BALL, AT, rng)])
+    assert [track.name for track in tracker.tracks] == ["ball"]
