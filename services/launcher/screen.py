@@ -46,7 +46,7 @@ class Screen:
         lines += [f"page   {page}" if len(page) + 7 < columns else page for page in _pages(children)]  # an address must not be cut
         lines += ["", f"{'service':<16}{'state':<10}{'pid':>8}{'restarts':>10}  status"]
         lines += [_row(child) for child in children]
-        added = [line for text in self._lines for line in textwrap.wrap(text, columns - 1, subsequent_indent=" " * 9)]
+        added = [line for text in self._lines for line in textwrap.wrap(text, max(1, columns - 1), subsequent_indent=" " * 9)]
         end = [] if last else ["Ctrl-C stops everything."]
         lines = lines[: rows - 1 - len(end)]  # lines that have scrolled away could not be overwritten
         room = rows - 2 - len(end) - len(lines)

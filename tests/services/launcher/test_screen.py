@@ -55,6 +55,17 @@ def test_the_screen_fits_the_terminal(monkeypatch: pytest.MonkeyPatch, children:
     assert lines[-1] == "Ctrl-C stops everything."
 
 
+@pytest.mark.parametrize("columns", [1, 2])
+def test_a_terminal_that_is_too_narrow_does_not_end_the_launcher(
+    monkeypatch: pytest.MonkeyPatch, children: list[Child], columns: int
+) -> None:
+    monkeypatch.setattr("sys.stderr", Terminal())
+    monkeypatch.setenv("COLUMNS", str(columns))
+    screen = Screen("a test")
+    screen.add("all ready")
+    screen.draw(children, Path("runs/x"))
+
+
 def test_where_not_all_news_fit_the_newest_stay(monkeypatch: pytest.MonkeyPatch, children: list[Child]) -> None:
     terminal = Terminal()
     monkeypatch.setattr("sys.stderr", terminal)
