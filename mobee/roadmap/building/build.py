@@ -25,7 +25,7 @@ from mobee.roadmap.building.lattice_builder import LatticeBuilder
 from mobee.roadmap.building.search_scheduler import SearchSettings, check_setting
 from mobee.roadmap.building.tasks import Task
 from mobee.roadmap.ik.costs import collision
-from mobee.roadmap.ik.problem import Cost, Problem
+from mobee.roadmap.ik.problem import Cost, Problem, require_list
 from mobee.roadmap.ik.solve import METHODS
 from mobee.roadmap.ik.terms import Term
 from mobee.roadmap.roadmap import Roadmap
@@ -142,8 +142,7 @@ def _has_derivatives(model: Model, task: Task) -> bool:
 
 
 def _with_contacts(costs: Sequence[Cost]) -> list[Cost]:
-    if isinstance(costs, Term) or not isinstance(costs, Sequence):
-        raise InvalidValue(f"costs is {costs!r}; it must be a list of terms.")
+    require_list(costs)
     has_collision = any(isinstance(one, Term) and one.name == "collision" for one in costs)
     return list(costs) if has_collision else [*costs, collision()]
 

@@ -114,6 +114,7 @@ class Problem:
         self, model: Model, costs: Sequence[Cost], start: ArrayLike | None, motors: Sequence[str] | None, margin: float = 0.0
     ) -> None:
         robot = model.robot
+        require_list(costs)
         self.model = solid_model(model)
         self.by_name = named([cost if isinstance(cost, Term) else term(cost) for cost in costs])
         self.terms = tuple(self.by_name.values())
@@ -143,6 +144,12 @@ class Problem:
             if one.tolerance is not None:
                 good &= missing <= one.tolerance
         return total, good
+
+
+def require_list(costs: object) -> None:
+    """Raise InvalidValue unless the costs are a sequence, and not one term alone."""
+    if isinstance(costs, Term) or not isinstance(costs, Sequence):
+        raise InvalidValue(f"costs is {costs!r}; it must be a list of terms.")
 
 
 def _within(limits: Array, margin: float, units: Array) -> Array:

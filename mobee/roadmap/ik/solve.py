@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mobee.arrays import Array, Ints, checked_threads
+from mobee.arrays import Array, Ints, checked_seed, checked_threads
 from mobee.errors import InvalidValue, UnknownName
 from mobee.model.contact import Contact, ContactTable, links_moved
 from mobee.model.model import Model
@@ -96,10 +96,10 @@ def solve_ik(
     """
     if method not in METHODS:
         raise UnknownName("method", method, METHODS)
-    if evaluations < POPULATION:
+    if not evaluations >= POPULATION:
         raise InvalidValue(f"evaluations {evaluations}: must be at least {POPULATION}, one generation.")
     problem = Problem(model, costs, start, motors)
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(checked_seed(seed))
     q = None if method == "nes" else least_squares(problem, rng)
     if q is None:
         q = problem.start if method == "least_squares" else _evolved(problem, rng, problem.evaluations + evaluations)

@@ -155,6 +155,11 @@ def test_terms_with_equal_names_get_numbers(free: mobee.Model) -> None:
         ({"motors": ["left_leg"]}, UnknownName),
         ({"method": "newton"}, UnknownName),
         ({"evaluations": 3}, InvalidValue),
+        ({"evaluations": float("nan")}, InvalidValue),
+        ({"seed": -1}, InvalidValue),
+        ({"seed": 1.5}, InvalidValue),
+        ({"costs": costs.home()}, InvalidValue),
+        ({"costs": None}, InvalidValue),
     ],
 )
 def test_invalid_arguments_are_refused(free: mobee.Model, arguments: dict, error: type) -> None:
