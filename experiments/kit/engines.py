@@ -199,6 +199,8 @@ def do(work: Work, cell: Cell) -> Done:
         values = work(cell)
     except Exception:  # of the experiment's own code: it is reported with the cell's name, and the other cells continue
         return Done(cell, time.monotonic() - start, None, traceback.format_exc())
+    if not isinstance(values, dict):
+        return Done(cell, time.monotonic() - start, None, f"its trial returned {values!r}: return a dict of values by name")
     return Done(cell, time.monotonic() - start, values)
 
 

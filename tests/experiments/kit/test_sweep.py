@@ -19,7 +19,7 @@ from experiments.kit.sweep import CellsFailed, Condition, Sweep, TimeLeft, group
 from mobee.errors import InvalidValue
 from mobee.roadmap.ompl import OmplMissing
 from tests.experiments.finished_cells import finished
-from tests.experiments.kit.toy_sweep import cells, options, signals_of_a_child, useless, work
+from tests.experiments.kit.toy_sweep import cells, forgetful, options, signals_of_a_child, useless, work
 
 
 def conditions(arguments):
@@ -121,9 +121,10 @@ def test_a_cell_whose_process_ends_is_named_and_the_others_are_finished(tmp_path
 
 
 @pytest.mark.parametrize("jobs", ["1", "2"])
-def test_values_that_cannot_be_kept_fail_their_cell(tmp_path, jobs):
-    with pytest.raises(CellsFailed, match="no JSON value"):
-        run_cells(useless, cells(2), tmp_path, options(str(tmp_path), "--jobs", jobs))
+@pytest.mark.parametrize(("trial", "says"), [(useless, "no JSON value"), (forgetful, "returned None: return a dict of values by name")])
+def test_values_that_cannot_be_kept_fail_their_cell(tmp_path, jobs, trial, says):
+    with pytest.raises(CellsFailed, match=f"2 of 2 cells failed[\\s\\S]*{says}"):
+        run_cells(trial, cells(2), tmp_path, options(str(tmp_path), "--jobs", jobs))
     assert not load_cells(tmp_path)
 
 

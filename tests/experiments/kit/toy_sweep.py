@@ -56,6 +56,10 @@ def signals_of_a_child(cell: Cell) -> dict[str, object]:
     return {"said": subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip()}
 
 
+def forgetful(cell: Cell) -> None:
+    pass
+
+
 def useless(cell: Cell) -> dict[str, object]:
     return {"is": object()}
 
