@@ -180,7 +180,10 @@ def _run(experiment: Experiment, options: argparse.Namespace) -> int:
             if options.track:
                 track_stores(folder)
     except OSError as error:
-        raise UserError(f"cannot write the run's folder: {error}; name another with --runs", ENVIRONMENT) from None
+        if folder is None:
+            raise UserError(f"cannot write the run's folder: {error}; name another with --runs", ENVIRONMENT) from None
+        resume = f"`mobee experiment run {experiment.name} --resume {folder}`"
+        raise UserError(f"cannot read or write a file: {error}; what is finished is kept; continue with {resume}", ENVIRONMENT) from None
     except CellsFailed as error:
         raise UserError(f"{error}\nRepeat them with `mobee experiment run {experiment.name} --resume {folder}`", FAILED) from None
     except KeyboardInterrupt:

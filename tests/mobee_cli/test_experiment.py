@@ -189,6 +189,17 @@ def test_an_interruption_leaves_the_finished_records_and_prints_how_to_continue(
     assert "Traceback" not in out + err
 
 
+def test_a_disk_that_is_full_during_a_run_is_reported_with_how_to_continue(tmp_path, monkeypatch, capsys):
+    def fail(arguments, folder):
+        raise OSError(28, "No space left on device")
+
+    set_run(monkeypatch, fail)
+    assert main(["experiment", "run", "model-throughput", "--runs", str(tmp_path)]) == 3
+    (folder,) = tmp_path.iterdir()
+    said = capsys.readouterr().err
+    assert "No space left on device" in said and f"continue with `mobee experiment run model-throughput --resume {folder}`" in said
+
+
 def test_ctrl_c_before_there_is_a_run_is_reported_in_one_line(tmp_path, monkeypatch, capsys):
     def interrupted(runs, name, options):
         raise KeyboardInterrupt
