@@ -30,7 +30,7 @@ from __future__ import annotations
 import argparse
 import tempfile
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -147,7 +147,8 @@ class Job(Struct, frozen=True):
 
     `kind`: "before" (live tries before the change), "after" (evaluations and tries after it) or "oracle".  `store`: path of the file with
     what was learned offline and before the change.  `change`: key of CHANGES.  `tries`: live tries before the change, or after it.
-    `practice`: tries in the simulated world.  `truth`: path of the file with the oracle's knowledge.
+    `practice`: tries in the simulated world.  `targets`: number of targets after the change; None: all 27.  `truth`: path of the file with
+    the oracle's knowledge.
     """
 
     kind: Literal["before", "after", "oracle"]
@@ -157,6 +158,7 @@ class Job(Struct, frozen=True):
     tries: int
     practice: int
     truth: str = ""
+    targets: int | None = None
 
 
 class Score(Struct, frozen=True):
@@ -191,7 +193,7 @@ def _before(hand: TrueHand, job: Job, folder: Path) -> None:
 
 
 def _after(hand: TrueHand, job: Job, folder: Path) -> None:
-    eyes = SeenHand(hand.robot, RIGHT, job.seed)
+    eyes, targets = SeenHand(hand.robot, RIGHT, job.seed), grid_targets()[: job.targets]
     agent = _agent(eyes.correct(hand), job)
     with ReachStore(job.store, PART, read_only=True) as store:
         agent.replay(store.problems(), store.load())
@@ -199,13 +201,13 @@ def _after(hand: TrueHand, job: Job, folder: Path) -> None:
     def evaluate(repetitions: int) -> None:
         eyes.is_seen = False
         detected = len(eyes.offsets.changes) + (0 if agent.changes is None else len(agent.changes.detected))
-        append_done(folder, _score(agent, repetitions, detected))
+        append_done(folder, _score(agent, targets, repetitions, detected))
         eyes.is_seen = True
 
     evaluate(REPETITIONS[0])
     if job.change != "turn":
-        agent.practise(seen_plant(job.change, job.seed), grid_targets(), job.practice)
-    agent.learn(grid_targets(), job.tries)
+        agent.practise(seen_plant(job.change, job.seed), targets, job.practice)
+    agent.learn(targets, job.tries)
     evaluate(REPETITIONS[1])
 
 
@@ -218,24 +220,23 @@ def _agent(plant: ReachPlant, job: Job, store: ReachStore | None = None) -> Reac
 
 
 def _oracle(hand: TrueHand, job: Job, folder: Path) -> None:
-    known = load_learned(job.store, PART, hand.robot)
+    known, targets = load_learned(job.store, PART, hand.robot), grid_targets()[: job.targets]
     agent = oracle(load_truth(Path(job.truth)), known.space, hand, known.model.debiased(), MARKER, SCALE, job.seed)
-    agent.learn(grid_targets(), job.tries)
-    append_done(folder, _score(agent, ORACLE_REPETITIONS, 0))
+    agent.learn(targets, job.tries)
+    append_done(folder, _score(agent, targets, ORACLE_REPETITIONS, 0))
 
 
-def _score(agent: ReachAgent, repetitions: int, detected: int) -> Score:
-    found = agent.evaluate(grid_targets(), repetitions)
+def _score(agent: ReachAgent, targets: Sequence[ReachTarget], repetitions: int, detected: int) -> Score:
+    found = agent.evaluate(targets, repetitions)
     without = float(np.isnan(found.missing).sum(axis=1).mean())
     return Score(float(found.scores.mean()), float(found.failures.sum(axis=1).mean()), without, detected)
 
 
-def measured_truth(change: str, seed: int) -> Truth:
-    """Return what the oracle of a changed world knows, measured on the offline plant in this world.
+def measured_truth(change: str, seed: int, targets: Sequence[ReachTarget]) -> Truth:
+    """Return what the oracle of a changed world knows of the targets, measured on the offline plant in this world.
 
     `change`: key of CHANGES.  `seed`: of the plant.
     """
-    targets = grid_targets()
     plant = JudgedPlant(offline_plant_in(changed_world(change), seed), errors_after(change, robot()))
     enter = partial(_put_into, plant)
     missing, failed = remaining_errors(plant, space(), targets, enter), failed_transitions(plant, space(), 2, enter)
@@ -284,11 +285,13 @@ def world_file(change: str, folder: Path) -> Path:
 
 
 def conditions(arguments: argparse.Namespace) -> list[Condition]:
-    """Return the settings of the runs: the learner, and the oracle after each change; with --quick the ball alone, and few tries."""
+    """Return the settings of the runs: the learner, and the oracle after each change; --quick: one seed, one change, few targets."""
     quick = arguments.quick
     settings = {"backend": arguments.backend, "changes": ["ball"] if quick else list(CHANGES), "practice": 20 if quick else PRACTICE}
     settings |= {"tries": 20 if quick else TRIES, "before": 3 if quick else LIVE_TRIES, "after": 3 if quick else CHECKPOINTS[-1]}
-    found = [Condition("quick-learner" if quick else "learner", settings | {"runs": "learner"}, 3.0)]
+    settings |= {"targets": 3} if quick else {}
+    name, seeds = ("quick-learner", (arguments.seed,)) if quick else ("learner", ())
+    found = [Condition(name, settings | {"runs": "learner"}, 3.0, seeds)]
     for change in settings["changes"]:
         alone = {"changes": [change], "runs": "oracle", "after": 3 if quick else 3 * len(grid_targets())}
         found.append(Condition(f"{'quick-' if quick else ''}{change}-oracle", settings | alone, seeds=(arguments.seed,)))
@@ -302,20 +305,20 @@ def trial(settings: dict[str, Any], seed: int) -> dict[str, Any]:
     means over the evaluations at one time: `score`, sum of the rewards; `failures`, number of failed transitions; `without`, number of
     targets for which no reach was made; and `detected`, number of changes detected until then.  `settings`: "runs", "learner" or "oracle";
     "changes", keys of CHANGES; "backend".  Numbers of tries before the change: "tries", offline; "before", live.  After the change:
-    "practice", in a simulation of the changed world; "after", live.  `seed`: of learner and robot.
+    "practice", in a simulation of the changed world; "after", live.  "targets": number of targets after it.  `seed`: of learner and robot.
     """
     rows: list[list[Score]] = []
     with tempfile.TemporaryDirectory() as scratch:
         place, backend = Path(scratch), settings["backend"]
         train(place / STORE, seed, TRANSITIONS, settings["tries"])
-        before = Job("before", seed, str(place / STORE), "", settings["before"], settings["practice"])
+        before = Job("before", seed, str(place / STORE), "", settings["before"], settings["practice"], targets=settings.get("targets"))
         if settings["runs"] == "learner":
             _launched(place / "before", before, backend)
         kind: Literal["after", "oracle"] = "after" if settings["runs"] == "learner" else "oracle"
         for change in settings["changes"]:
             job = structs.replace(before, kind=kind, change=change, tries=settings["after"], truth=str(place / "truth.npz"))
             if kind == "oracle":
-                measured_truth(change, seed).save(Path(job.truth))
+                measured_truth(change, seed, grid_targets()[: job.targets]).save(Path(job.truth))
             rows.append(_launched(place / change, job, backend))
     names = ("score", "failures", "without", "detected")
     return {name: np.array([[getattr(one, name) for one in row] for row in rows]) for name in names}

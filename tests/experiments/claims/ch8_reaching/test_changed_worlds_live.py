@@ -86,3 +86,21 @@ def test_a_system_that_ended_before_all_evaluations_is_named(tmp_path, monkeypat
     with pytest.raises(LaunchFailed, match="ball: the system ended after 1 of 2 evaluations"):
         changed_worlds_live._launched(tmp_path / "ball", job, "pybullet")
     assert len(changed_worlds_live._launched(tmp_path / "ball", replace(job, kind="oracle"), "pybullet")) == 1
+
+
+def test_a_short_run_has_one_seed_and_few_targets_for_learner_and_oracle(monkeypatch):
+    assert [one.seeds for one in conditions(Namespace(**vars(OPTIONS) | {"quick": True}))] == [(0,), (0,)]
+    jobs, measured = [], []
+    monkeypatch.setattr(changed_worlds_live, "train", lambda *_: None)
+    monkeypatch.setattr(changed_worlds_live, "measured_truth", lambda change, seed, targets: measured.append(len(targets)) or NoTruth())
+    monkeypatch.setattr(changed_worlds_live, "_launched", lambda folder, job, backend: jobs.append(job) or [Score(1.0, 0.0, 0.0, 0)])
+    for quick in (True, False):
+        for one in conditions(Namespace(**vars(OPTIONS) | {"quick": quick})):
+            EXPERIMENT.method.trial(one.settings, 0)
+    assert [job.targets for job in jobs] == [3, 3, 3] + [None] * (1 + 2 * len(CHANGES))
+    assert measured == [3] + [27] * len(CHANGES)
+
+
+class NoTruth:
+    def save(self, path):
+        pass
