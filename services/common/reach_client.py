@@ -63,8 +63,7 @@ class ReachClient:
                 f"by {keys.world_rpc('role')}, or reach for a free position."
             )
         self.present(None)
-        radius = _inner_radius(found.geometry) - found.margin
-        self._target, self._object = ReachTarget(np.array(found.position), radius, aim, normal, faces), name
+        self._target, self._object = ReachTarget(np.array(found.position), inner_radius(found), aim, normal, faces), name
         return self._target
 
     def asked(self) -> dict[str, object]:
@@ -176,8 +175,11 @@ class ReachClient:
             self._is_there = False
 
 
-def _inner_radius(shape: Geometry) -> float:
-    """Return the radius [m] of the largest sphere about the centre that fits into the shape."""
+def inner_radius(found: ObjectState) -> float:
+    """Return the radius [m] of the largest sphere about the centre that fits into an object, without the margin of its shape."""
+    shape = found.geometry
     if shape.kind == "box":
-        return 0.5 * min(shape.size)
-    return min(shape.size[0], 0.5 * shape.size[1]) if shape.kind == "cylinder" else shape.size[0]
+        radius = 0.5 * min(shape.size)
+    else:
+        radius = min(shape.size[0], 0.5 * shape.size[1]) if shape.kind == "cylinder" else shape.size[0]
+    return radius - found.margin

@@ -40,6 +40,7 @@ from mobee.reach import TARGET
 from mobee.robot.robot import Robot
 from services.common.emergency_stop import SILENCE, StopRecord, StopSender
 from services.common.hands import hand_for, hand_of, part_of
+from services.common.reach_client import inner_radius
 from services.common.rpc import CallFailed
 from services.common.service import Service
 from services.monitor.story.sentences import STRATEGIES
@@ -264,7 +265,7 @@ class PageControls:
                 raise Refused(f"the model knows no {name}, only {known}: vision must see it. Click a place instead, then H")
             if found.role != "target":
                 raise Refused(f"{name} has the role {found.role}; hands reach for targets only. Click a place instead")
-            place, radius = np.array(found.position), _inner_radius(found.geometry)
+            place, radius = np.array(found.position), inner_radius(found)
         if place is None:
             raise Refused("click a place, or name an object")
         hand = hand_for(self._robot, place) if not given.get("part") else hand_of(self._robot, self._part(given))
@@ -379,8 +380,3 @@ def _place_of(given: Any) -> Array:
     if place.shape != (3,) or not np.isfinite(place).all() or np.linalg.norm(place) > FARTHEST:
         raise Refused(f"{given!r} is not a place: give three coordinates in m, at most {FARTHEST:g} m from the robot")
     return place
-
-
-def _inner_radius(shape: Geometry) -> float:
-    """Radius [m] of the largest sphere about the centre that fits into the shape."""
-    return 0.5 * min(shape.size) if shape.kind == "box" else shape.size[0]

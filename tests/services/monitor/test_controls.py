@@ -51,10 +51,12 @@ class Clicked:
     """Controls of a page whose calls are answered at once, and the calls that they have made, with their data.
 
     The world of the model and the presenter of its target are simulated. `presents`: name of the service that presents the target.
+    `reached`: data of the newest reach.
     """
 
     def __init__(self) -> None:
         self.made: list[str] = []
+        self.reached: dict[str, Any] = {}
         self.presents, self.epoch = "", 1
         self.known = Known()
         self.alive: dict[str, set[str]] = {}
@@ -82,6 +84,8 @@ class Clicked:
             self.presents = "monitor"
         if key == keys.world_rpc("remove"):
             self.presents = ""
+        if key == keys.goal(part, "reach"):
+            self.reached = fields
         return None
 
 
@@ -115,6 +119,13 @@ def test_a_page_leaves_the_target_of_a_working_agent(clicked: Clicked) -> None:
     clicked.do("give", part="left_arm")
     assert clicked.presents == "agent_right_arm"
     assert keys.world_rpc("remove") not in clicked.made
+
+
+def test_a_page_reaches_for_the_sphere_within_an_object_without_the_margin_of_its_shape(clicked: Clicked) -> None:
+    cup = ObjectState("cup", Geometry("cylinder", [0.06, 0.04]), PLACE, [1.0, 0.0, 0.0, 0.0], role="target", link="", margin=0.008)
+    clicked.known.objects["cup"] = cup
+    clicked.do("reach", object="cup")
+    assert clicked.reached["radius"] == pytest.approx(0.012)
 
 
 def test_the_explorer_changes_for_the_agents_that_run(clicked: Clicked) -> None:
