@@ -29,11 +29,12 @@ def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Launched]:
 def test_status_shows_every_service(running: Launched) -> None:
     done = mobee("status", "--endpoint", running.endpoint)
     assert done.returncode == 0
-    services, health = done.stdout.split("\n\n")[:2]
+    services, *others = done.stdout.split("\n\n")
+    health = next(block for block in others if block.startswith("process"))
     rows = {line.split()[0]: line.split()[1] for line in services.splitlines()}
     assert {line.split()[0] for line in health.splitlines()[1:]} == {"launcher", "agent_toy", "two"}
     assert rows["launcher"] == rows["agent_toy"] == rows["two"] == "ready"
-    assert max(map(len, done.stdout.splitlines())) <= 80
+    assert max(map(len, [*services.splitlines(), *health.splitlines()])) <= 80
 
 
 def test_doctor_describes_the_running_system(running: Launched) -> None:
