@@ -153,7 +153,7 @@ class PageControls:
 
         If the page that has the controls is not among `open_pages` (ids), all its parts are given back. If the page requested a motion of
         a hand to a target (a reach), the part is given back 4 s after the end of this motion. If another client has taken a part from the
-        page, the page gives the part up, and the part's agent is asked to resume.
+        page, or the controller was started again, the page gives the part up, and the part's agent is asked to resume.
         """
         with self._lock:
             self._pages = len(open_pages)
@@ -367,7 +367,7 @@ class PageControls:
 
     def _is_done(self, part: str, taken: _Taken) -> bool:
         reach, motion = self._known.reaches.get(part), self._known.motions.get(part)
-        if motion is not None and motion.epoch > taken.epoch:  # another client has it
+        if motion is not None and motion.epoch != taken.epoch:  # another client has it, or a new controller
             return True
         if not taken.reach or reach is None or reach.action_id != taken.reach or reach.phase in ("reaching", "returning"):
             return False

@@ -71,6 +71,10 @@ class Clicked:
     def move_slider(self, part: str) -> None:
         self.do("goal", part=part, q=self.robot.home[self.robot.part(part).slice].tolist())
 
+    def restart_controller(self, part: str) -> None:
+        """The part has no owner then."""
+        self.known.motions[part] = cast(Motion, SimpleNamespace(epoch=0, status="idle"))
+
     def _call(self, key: str, request: object, reply: object, **fields: Any) -> Any:
         self.made.append(key)
         part = key.split("/")[0]
@@ -100,6 +104,19 @@ def test_the_target_of_a_page_is_removed_when_the_part_is_given_back_although_a_
     assert clicked.presents == "monitor"
     clicked.do("give", part="right_arm")
     assert clicked.presents == ""
+
+
+@pytest.mark.parametrize("moves_slider", [False, True])
+def test_a_part_that_the_controller_has_lost_goes_back_to_its_agent(clicked: Clicked, moves_slider: bool) -> None:
+    clicked.alive["agent_right_arm"] = {"a"}
+    clicked.do("reach", part="right_arm", position=PLACE)
+    if moves_slider:
+        clicked.move_slider("right_arm")
+    clicked.controls.tend({"p"})
+    assert clicked.made[-1] == keys.goal("right_arm", "goal" if moves_slider else "reach")
+    clicked.restart_controller("right_arm")
+    clicked.controls.tend({"p"})
+    assert (clicked.presents, clicked.made[-1]) == ("", keys.service_rpc("agent_right_arm", "resume"))
 
 
 def test_a_page_removes_the_target_of_an_agent_that_rests_for_it(clicked: Clicked) -> None:
