@@ -270,11 +270,17 @@ class PageControls:
             raise Refused("click a place, or name an object")
         hand = hand_for(self._robot, place) if not given.get("part") else hand_of(self._robot, self._part(given))
         part = part_of(self._robot, hand)
+        before = self._taken.get(part)
         taken = self._take(part)
-        if name is None:
-            self._present(part, place)
         asked = {"marker": hand, "object": name or TARGET, "position": place.tolist(), "radius": radius, "aim": "surface", "stay": True}
-        taken.reach, taken.over_since = self._aim(part, "reach", ReachFor, **asked), None
+        try:
+            if name is None:
+                self._present(part, place)
+            taken.reach, taken.over_since = self._aim(part, "reach", ReachFor, **asked), None
+        except CallFailed:
+            if taken is not before:  # it was taken for this reach
+                self._give(part)
+            raise
         return f"The {title_of(hand)} reaches for {'it' if name is None else f'the {name}'}."
 
     def _present(self, part: str, place: Array) -> None:

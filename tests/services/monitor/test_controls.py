@@ -51,12 +51,13 @@ class Clicked:
     """Controls of a page whose calls are answered at once, and the calls that they have made, with their data.
 
     The world of the model and the presenter of its target are simulated. `presents`: name of the service that presents the target.
-    `reached`: data of the newest reach.
+    `reached`: data of the newest reach. `refuses`: the controller refuses reaches.
     """
 
     def __init__(self) -> None:
         self.made: list[str] = []
         self.reached: dict[str, Any] = {}
+        self.refuses = False
         self.presents, self.epoch = "", 1
         self.known = Known()
         self.alive: dict[str, set[str]] = {}
@@ -89,6 +90,8 @@ class Clicked:
         if key == keys.world_rpc("remove"):
             self.presents = ""
         if key == keys.goal(part, "reach"):
+            if self.refuses:
+                raise CallFailed("reach", "the part cannot reach for it")
             self.reached = fields
         return None
 
@@ -117,6 +120,21 @@ def test_a_part_that_the_controller_has_lost_goes_back_to_its_agent(clicked: Cli
     clicked.restart_controller("right_arm")
     clicked.controls.tend({"p"})
     assert (clicked.presents, clicked.made[-1]) == ("", keys.service_rpc("agent_right_arm", "resume"))
+
+
+def test_a_part_that_was_taken_for_a_refused_reach_goes_back_to_its_agent(clicked: Clicked) -> None:
+    clicked.alive["agent_right_arm"], clicked.refuses = {"a"}, True
+    with pytest.raises(Refused, match="cannot reach for it"):
+        clicked.do("reach", part="right_arm", position=PLACE)
+    assert (clicked.presents, clicked.made[-1]) == ("", keys.service_rpc("agent_right_arm", "resume"))
+
+
+def test_a_part_that_a_page_had_before_a_refused_reach_stays_with_the_page(clicked: Clicked) -> None:
+    clicked.alive["agent_right_arm"], clicked.refuses = {"a"}, True
+    clicked.move_slider("right_arm")
+    with pytest.raises(Refused, match="cannot reach for it"):
+        clicked.do("reach", part="right_arm", position=PLACE)
+    assert keys.service_rpc("agent_right_arm", "resume") not in clicked.made
 
 
 def test_a_page_removes_the_target_of_an_agent_that_rests_for_it(clicked: Clicked) -> None:
