@@ -275,7 +275,8 @@ class PageControls:
         asked = {"marker": hand, "object": name or TARGET, "position": place.tolist(), "radius": radius, "aim": "surface", "stay": True}
         try:
             if name is None:
-                self._present(part, place)
+                self._add_target(place)
+                self._presented = part
             taken.reach, taken.over_since = self._aim(part, "reach", ReachFor, **asked), None
         except CallFailed:
             if taken is not before:  # it was taken for this reach
@@ -283,22 +284,8 @@ class PageControls:
             raise
         return f"The {title_of(hand)} reaches for {'it' if name is None else f'the {name}'}."
 
-    def _present(self, part: str, place: Array) -> None:
-        """Put a target for a part into the model's world, instead of the target of an agent that rests for a page.
-
-        Raises CallFailed if another service presents a target.
-        """
-        try:
-            self._add_target(place)
-        except CallFailed as failed:
-            presenter = str(failed).partition(" ")[0]  # the refusal begins with its name
-            if failed.code != "owned" or presenter not in {taken.agent for taken in self._taken.values()}:
-                raise
-            self._remove_target()
-            self._add_target(place)
-        self._presented = part
-
     def _add_target(self, place: Array) -> None:
+        """Put a target into the model's world; raises CallFailed if another service presents one, which an agent that rests does not."""
         sphere, key = Geometry(kind="sphere", size=[PLACE_RADIUS]), keys.world_rpc("add")
         position = place.tolist()
         self._call(key, AddObject, Done, name=TARGET, geometry=sphere, position=position, quaternion=UPRIGHT, role="target")

@@ -83,6 +83,8 @@ class Clicked:
             self.epoch += 1
             self.known.motions[part] = cast(Motion, SimpleNamespace(epoch=self.epoch, status="idle"))
             return SimpleNamespace(epoch=self.epoch)
+        if self.presents and key == keys.service_rpc(self.presents, "rest"):
+            self.presents = ""
         if key == keys.world_rpc("add"):
             if self.presents not in ("", "monitor"):
                 raise CallFailed("owned", f"{self.presents} presents 'reach_target', and only one service at a time can")
@@ -137,10 +139,11 @@ def test_a_part_that_a_page_had_before_a_refused_reach_stays_with_the_page(click
     assert keys.service_rpc("agent_right_arm", "resume") not in clicked.made
 
 
-def test_a_page_removes_the_target_of_an_agent_that_rests_for_it(clicked: Clicked) -> None:
+def test_a_page_presents_a_target_instead_of_an_agent_that_rests_for_it(clicked: Clicked) -> None:
     clicked.alive["agent_right_arm"], clicked.presents = {"a"}, "agent_right_arm"
     clicked.do("reach", part="right_arm", position=PLACE)
     assert clicked.presents == "monitor"
+    assert clicked.made.count(keys.world_rpc("add")) == 1  # no other service may remove the target of an agent
     clicked.do("give", part="right_arm")
     assert (clicked.presents, clicked.made[-1]) == ("", keys.service_rpc("agent_right_arm", "resume"))
 
