@@ -49,8 +49,8 @@ class ServiceConfig(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """Prefix of all keys on the bus: icub for the robot, or the prefix under which the port filter's clients find the robot."""
     robot: str = "icub"
     """Shipped robot, or path to a robot file."""
-    seed: int = 0
-    """Seed of all random numbers in this service."""
+    seed: Annotated[int, Meta(ge=0)] = 0
+    """Seed of all random numbers in this service, 0 or more."""
     mode: Literal["free", "lock"] = "free"
     """free: in real time; lock: in lockstep, where every tick waits for all participants and time runs as fast as they answer."""
     patience: Annotated[float, Meta(ge=2, le=60)] = 2.0

@@ -61,6 +61,7 @@ def test_an_unknown_field_is_refused_with_file_line_and_nearest_name(tmp_path: P
     ("wrong", "field", "says"),
     [
         ('seed = "one"', "seed", "Expected a whole number, got a text"),
+        ("seed = -1", "seed", ">= 0"),
         ("share = 0.0", "share", "> 0"),
         ("share = 2.0", "share", "<= 1"),
         ("share = nan", "share", "> 0"),
