@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Protocol, runtime_checkable
 
 from mobee.arrays import Array
+from mobee.errors import InvalidValue
 from mobee.robot.robot import Robot
 
 
@@ -87,7 +88,8 @@ class PerceivingPlant:
 
     Args:
         plant: the plant that performs the actions, offline or live.
-        perceive: returns the present position (3,) m, root frame, of each perceived object, by name; called at the end of every action.
+        perceive: returns the present position (3,) m, root frame, of each perceived object, by name, in a dict, which is empty if none is
+            perceived; called at the end of every action.
     """
 
     def __init__(self, plant: Plant, perceive: Callable[[], Mapping[str, Array]]) -> None:
@@ -112,8 +114,14 @@ class PerceivingPlant:
         return replace(self.plant.act(part, target), perceived=self.perceive())
 
     def perceive(self) -> Mapping[str, Array]:
-        """Return a dict from the name of each perceived object to its present position (3,) m, root frame."""
-        return self._perceive()
+        """Return a dict from the name of each perceived object to its present position (3,) m, root frame.
+
+        Raises InvalidValue if the given function returns no dict.
+        """
+        found = self._perceive()
+        if not isinstance(found, Mapping):
+            raise InvalidValue(f"perceive returned {found!r}: return a dict from names to positions in m, {{}} if none is perceived.")
+        return found
 
     @property
     def settings(self) -> dict[str, Any]:

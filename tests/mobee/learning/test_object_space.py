@@ -69,6 +69,14 @@ def test_an_object_that_is_not_perceived_is_believed_where_it_was() -> None:
         made.state_after(hidden)
 
 
+def test_a_perceiving_function_that_returns_no_dict_is_refused() -> None:
+    plant = PerceivingPlant(Pusher(), lambda: None)
+    with pytest.raises(InvalidValue, match="returned None.* {} if none is perceived"):
+        plant.act("left_arm", plant.measure("left_arm"))
+    with pytest.raises(InvalidValue, match="returned None"):
+        CuriousAgent(space(), plant).step()
+
+
 def test_a_posture_alone_is_no_state() -> None:
     with pytest.raises(InvalidValue, match="state_after"):
         space().state_of(np.zeros(5))
