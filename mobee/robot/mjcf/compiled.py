@@ -190,9 +190,9 @@ def _named(model: Any, mujoco: Any) -> dict[str, tuple[str, ...]]:
     found = {}
     for kind, count in zip(KINDS, counts, strict=True):
         code = getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}")
-        given = [mujoco.mj_id2name(model, code, index) for index in range(count)]
+        given = [mujoco.mj_id2name(model, code, index) or "" for index in range(count)]
         taken = set(filter(None, given))
-        found[kind] = tuple(name or _unused(f"{kind}_{index}", taken) for index, name in enumerate(given))
+        found[kind] = tuple(name if name.strip() else _unused(f"{kind}_{index}", taken) for index, name in enumerate(given))
     return found
 
 

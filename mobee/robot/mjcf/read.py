@@ -61,7 +61,7 @@ def read_mjcf(path: Path, options: UrdfOptions | None = None) -> Robot:
         raise RobotFileError(f"{path}: no joint moves. A robot needs a hinge or a slide; draw fixed things in a world file.")
     _warn(compiled)
     motors = _motors(compiled, skeleton, drives, options.home)
-    name = compiled.model.names.split(b"\0", 1)[0].decode() or path.stem
+    name = compiled.model.names.split(b"\0", 1)[0].decode().strip() or path.stem
     where = _where(compiled, skeleton, name, motors)
     shapes, owners = _shapes(compiled, skeleton, options, where)
     bodies = {body: link for body, link in zip(compiled.names["body"], skeleton.link_of, strict=True)}
@@ -151,7 +151,7 @@ def _markers(compiled: Compiled, skeleton: _Skeleton, where: dict[tuple[str, str
     places: list[tuple[str, int, int, Frame]] = [
         ("site", site, int(model.site_bodyid[site]), compiled.sites[site])
         for site in range(model.nsite)
-        if model.site(site).name  # those without a name mark nothing that a person would ask for
+        if model.site(site).name.strip()  # those without a name mark nothing that a person would ask for
     ]
     for body in range(1, model.nbody):
         if body not in carrying or skeleton.link_of[body] == skeleton.link_of[model.body_parentid[body]]:

@@ -177,6 +177,13 @@ def test_it_is_written_as_zero_position_xml(tmp_path: Path) -> None:
     assert_same_robot(load_robot(write_xml(robot, tmp_path / "written.xml")), robot)
 
 
+def test_blank_names_count_as_none(tmp_path: Path) -> None:
+    inner = '<body name=" "><joint name=" "/><geom size=".1"/><site name=" "/></body>'
+    robot = read(mjcf_file(tmp_path, f'<worldbody><body name="b"><joint name="a"/><geom size=".1"/>{inner}</body></worldbody>'))
+    assert (robot.links, robot.motors, tuple(robot.markers)) == (("world", "b", "body_2"), ("a", "joint_1"), ("body_2",))
+    assert_same_robot(load_robot(write_xml(robot, tmp_path / "written.xml")), robot)
+
+
 def test_masses_are_those_of_mujoco(tmp_path: Path) -> None:
     path = mjcf_file(tmp_path, TREE)
     robot, model = read(path), mujoco.MjModel.from_xml_path(str(path))
