@@ -45,6 +45,7 @@ class RobotLaw:
         self.q: Array = robot.home  # (n,) rad, measured at the newest tick
         self._where = {name: part.slice for name, part in robot.parts.items()}
         self._units = fine_units(robot)
+        self._torques = np.array([motor.max_torque for motor in robot.motor_table])
         self._client_forces = np.zeros(len(robot.motors))
         self._pushes: dict[str, dict[str, Array]] = {}  # part -> marker -> (3,)
         self._own_terms = bus.publisher(ForcesMessage, "controller", "LATEST")
@@ -115,7 +116,11 @@ class RobotLaw:
 
     def _reference(self, command: Command) -> Array:
         reference: Array = getattr(command, self._config.modality)
-        return reference
+        return np.clip(reference, -self._torques, self._torques) if self._config.modality == "torque" else reference
+
+    def limit_torques(self, part: str, torques: Array) -> None:
+        """Set the largest torques of the part's motors, (n_part,) N m, which can differ from those in the robot's file."""
+        self._torques[self._where[part]] = torques
 
     # One part
 

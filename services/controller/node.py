@@ -197,7 +197,8 @@ class ControllerNode:
     # Life cycle
 
     def _new_run(self) -> None:
-        self._service.ask(keys.meta(next(iter(self._robot.parts))), PartMeta, self._compare_robots)
+        for part in self._robot.parts:
+            self._service.ask(keys.meta(part), PartMeta, self._note_meta)
         self._drives.forget()
         self._tick = None
         self._commands.begin_tick()
@@ -206,14 +207,19 @@ class ControllerNode:
             action.hold(self._service.bus.k)
             self._end_requests(part)
 
-    def _compare_robots(self, answer: PartMeta | CallFailed) -> None:
-        """End the process, before any part is armed, if robot_sim moves another robot, which may have the same number of motors."""
+    def _note_meta(self, answer: PartMeta | CallFailed) -> None:
+        """Limit the torques of a part as robot_sim does, so that its gate accepts them.
+
+        The process ends, before any part is armed, if robot_sim moves another robot, which may have the same number of motors.
+        """
         if isinstance(answer, CallFailed):
             self._service.log.info("robot_sim did not answer which robot it moves: %s", answer)
         elif answer.robot_hash != robot_hash(self._robot):
             robots = f"robot_sim moves the robot {answer.robot!r}, the controller has {self._config.robot!r}"
             self._service.bus.event("error", "other_robot", f"{robots}: set the same in both, as shared.robot")
             raise SystemExit(BAD_INPUT)
+        else:
+            self._law.limit_torques(answer.part, np.array(answer.max_torque))
 
     def _mark(self) -> None:
         self._counters = Counters()

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Literal, NoReturn
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from bus_schema import VERSION, keys
 from bus_schema.messages import Clock
@@ -28,10 +29,12 @@ from services.common.rate import Rate
 from services.common.service import CallRefused, Service
 from services.robot_sim.choice import choose
 from services.robot_sim.config import Config
+from services.robot_sim.gate import Limits
 from services.robot_sim.guard import Guard
 from services.robot_sim.kinematic import Backend
 from services.robot_sim.lockstep import START_PERIOD, Lockstep
 from services.robot_sim.sensors import Phases, Sensors, errors_of, part_meta
+from services.robot_sim.strength import with_torques
 from services.robot_sim.watch import Watch
 
 MIN_SPREAD_PERIOD = 0.0025  # s; in shorter ticks all parts are read at once, without waiting for their sampling times
@@ -62,7 +65,8 @@ class Node:
         self._pause: Pause | None = None
         self._pace = 0.0  # lockstep: s of real time that a simulated second takes at least
         record = StopRecord(Path(config.stop_record)) if config.stop_record else None
-        self._guard = Guard(service, robot, backend, self._dt, record, config.speed, self._open_datagrams())
+        self._strong = with_torques(robot, config.torques)
+        self._guard = Guard(service, self._strong, backend, self._dt, record, config.speed, self._open_datagrams())
         self._phases = Phases(tuple(robot.parts), config.jitter, config.seed)
         self._sensors = Sensors(self._bus, robot, self._dt, errors_of(robot, config.encoder_errors))
         self._clock = self._bus.publisher(Clock)
@@ -271,7 +275,8 @@ class Node:
             self._lockstep.note_flaw(why)
 
     def _meta(self, request: Empty, key: str) -> PartMeta:
-        return part_meta(self._robot, key.split("/")[0])
+        part = key.split("/")[0]
+        return replace(part_meta(self._robot, part), max_torque=Limits.of(self._strong, part).torque.tolist())
 
 
 def _new_run() -> str:

@@ -8,7 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
+from bus_schema import keys
+from bus_schema.rpc import Empty
+from services.common.worlds import robot_hash
+from services.robot_sim.sensors import part_meta
+from services.robot_sim.strength import with_torques
 from tests.services.controller.stage import PARTS, ROBOT, Stage, near, refused, staged
 from tests.services.harness import rig, wait_for
 
@@ -41,6 +47,20 @@ def test_position_commands_begin_at_the_measured_posture(tmp_path: Path) -> None
         first = wait_for(lambda: stage.commands("right_arm"), "a command")[0]
         assert first.mode == "position"
         np.testing.assert_allclose(first.ref, stage.sim.of("right_arm"), atol=1e-3)
+
+
+def test_torque_commands_keep_the_limits_that_the_simulator_states(tmp_path: Path) -> None:
+    with rig(tmp_path, ROBOT) as made:
+        weak = with_torques(ROBOT, {"l_*": 0.5})
+        for part in PARTS:
+            made.serve(keys.meta(part), Empty, lambda _, key: replace(part_meta(weak, key.split("/")[0]), robot_hash=robot_hash(ROBOT)))
+        stage = staged(made, "--modality", "torque")
+        stage.under_control()
+        for part in ("left_arm", "right_arm"):
+            stage.goal(part, stage.own(part)[1], near(part))
+        stage.ticks(20)
+        largest = {part: max(np.abs(command.ref).max() for command in stage.commands(part)) for part in ("left_arm", "right_arm")}
+        assert largest["left_arm"] == 0.5 < largest["right_arm"]
 
 
 @pytest.mark.parametrize(

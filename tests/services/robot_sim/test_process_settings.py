@@ -13,10 +13,11 @@ import pytest
 
 from bus_schema import keys
 from bus_schema.messages import EStop
-from bus_schema.rpc import Done, Empty
+from bus_schema.rpc import Done, Empty, PartMeta
 from experiments.kit.live.launch import free_endpoint
 from services.common.emergency_stop import Stop, StopDatagrams, StopRecord, StopSender
 from services.common.rpc import CallFailed
+from services.common.worlds import robot_hash
 from tests.services.harness import rig, wait_for
 from tests.services.robot_sim.bench import ROBOT, Bench, elbow
 
@@ -68,6 +69,18 @@ def test_encoders_have_the_errors_that_are_set_and_the_truth_has_none(tmp_path: 
         errors = np.array(bench.newest("left_arm").q) - np.array(bench.truths[-1].q)[where]
         assert errors[index - where.start] == pytest.approx(0.09, abs=0.015)
         assert np.delete(errors, index - where.start) == pytest.approx(0.0, abs=0.015)
+
+
+def test_the_largest_torques_that_are_set_are_those_of_gate_and_metadata(tmp_path: Path) -> None:
+    settings = tmp_path / "torques.toml"
+    settings.write_text('backend = "kinematic"\ntorques = { l_elbow = 0.5 }\n')
+    with rig(tmp_path, ROBOT) as bus:
+        bench = Bench(bus, "--config", str(settings))
+        meta = bus.call(keys.meta("left_arm"), Empty, PartMeta)
+        assert meta.max_torque == pytest.approx([0.5 if motor == "l_elbow" else 40.0 for motor in meta.motors])
+        assert meta.robot_hash == robot_hash(ROBOT)  # the controller has the robot's file
+        epoch = bench.arm("left_arm")
+        bench.refuses("torque", lambda: bench.send("left_arm", epoch, elbow(0.6), mode="torque"))
 
 
 def test_a_new_process_is_a_new_run_in_which_no_old_epoch_fits(tmp_path: Path) -> None:
