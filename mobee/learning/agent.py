@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Protocol, cast
 
-from mobee.arrays import Array
+from mobee.arrays import Array, checked_count
 from mobee.errors import ActionInterrupted, InvalidValue, MobeeError
 from mobee.learning.explorers import EXPLORERS, Explorer
 from mobee.learning.learner import CuriousLearner, CuriousSettings
@@ -186,8 +186,11 @@ class CuriousAgent(CuriousLearner):
         return self.observe(outcome)
 
     def run(self, transitions: int) -> None:
-        """Make `transitions` more transitions. An interrupted action does not count: the agent measures its state and decides again."""
-        end = self.transitions + transitions
+        """Make `transitions` more transitions. An interrupted action does not count: the agent measures its state and decides again.
+
+        Raises InvalidValue unless `transitions` is a whole number of at least 0.
+        """
+        end = self.transitions + checked_count("transitions", transitions)
         while self.transitions < end:
             try:
                 self.step()
@@ -214,10 +217,10 @@ def run(agents: Sequence[CuriousAgent], transitions: int) -> None:
     """Run agents of different parts at the same time on one plant until they have made `transitions` more transitions in total.
 
     Exactly that many actions are started, so at the end all actions have ended and every transition was observed. Raises InvalidValue
-    unless each agent has its own part and all have the same plant, a `ConcurrentPlant`. After an exception or Ctrl-C the actions under way
-    are not learned, and each agent measures its state.
+    unless each agent has its own part, all have the same plant, a `ConcurrentPlant`, and `transitions` is a whole number of at least 0.
+    After an exception or Ctrl-C the actions under way are not learned, and each agent measures its state.
     """
-    plant = _common_plant(agents)
+    plant, transitions = _common_plant(agents), checked_count("transitions", transitions)
     try:
         _run_together(plant, agents, transitions)
     except BaseException:  # the robot may have moved

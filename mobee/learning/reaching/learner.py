@@ -20,7 +20,7 @@ from mobee.learning.reaching.strategies import STRATEGIES, Strategy, StrategyOf
 from mobee.learning.space import Space
 from mobee.learning.transitions import TransitionModel
 from mobee.learning.value_iteration import OutcomeModel
-from mobee.reach import ReachTarget
+from mobee.reach import ReachTarget, checked_target
 from mobee.settings import Range, Settings, named
 
 
@@ -147,9 +147,10 @@ class ReachLearner:
     def begin(self, target: ReachTarget) -> None:
         """Start a problem-try (attempt to reach one target), or continue the present one if its target is at the same position.
 
-        If the present problem-try has a target at another position, it is ended first.
+        If the present problem-try has a target at another position, it is ended first. Raises InvalidValue if the target is no
+        `ReachTarget`.
         """
-        problem = self.problems.index(target)
+        problem = self.problems.index(checked_target(target))
         if problem != self._problem:
             self.end_try()
             self._problem = problem

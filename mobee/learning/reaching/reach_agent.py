@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from mobee.arrays import Array, Ints
+from mobee.arrays import Array, Ints, checked_count
 from mobee.errors import ActionInterrupted, InvalidValue
 from mobee.learning.explorers import choose
 from mobee.learning.object_space import ObjectSpace
@@ -25,7 +25,7 @@ from mobee.learning.space import Space
 from mobee.learning.transitions import TransitionModel
 from mobee.learning.value_iteration import OutcomeModel
 from mobee.plant import Outcome, Plant
-from mobee.reach import ReachOutcome, ReachPlant, ReachTarget, reward_of
+from mobee.reach import ReachOutcome, ReachPlant, ReachTarget, checked_target, reward_of
 from mobee.settings import accepts
 
 NO_STATE = -1  # instead of a state, where no reach was made
@@ -119,8 +119,10 @@ class ReachAgent(ReachLearner):
         """Make `tries` more attempts to reach a target (problem-tries), each for the problem with the fewest tries (thesis 8.3.2).
 
         A problem is one target. If several problems have the fewest tries, a random one of them is chosen. A problem-try under way is
-        continued first. If an action is interrupted, the agent chooses the next action of the same problem-try.
+        continued first. If an action is interrupted, the agent chooses the next action of the same problem-try. Raises InvalidValue if a
+        problem is no `ReachTarget`, or `tries` is no whole number of at least 0.
         """
+        tries, problems = checked_count("tries", tries), _checked_problems(problems)
         self._catch_up()
         end = self.tries + tries
         while self.tries < end:
@@ -169,7 +171,8 @@ class ReachAgent(ReachLearner):
     def evaluate(self, problems: Sequence[ReachTarget], repetitions: int = 1) -> Evaluation:
         """Try every problem in each repetition with what was learned so far, and return the results (thesis 8.3.3).
 
-        The robot moves, but the agent does not learn.
+        The robot moves, but the agent does not learn. Raises InvalidValue if a problem is no `ReachTarget`, or `repetitions` is no whole
+        number of at least 0.
         """
         try:
             return evaluate(self, problems, repetitions)
@@ -245,7 +248,8 @@ def evaluate(agent: ReachAgent, problems: Sequence[ReachTarget], repetitions: in
     state in which the previous one ended. The agent does not learn from this: which transitions fail is recorded in a copy of
     `agent.failures`, and the copy is discarded at the end of the repetition.
     """
-    shape = repetitions, len(problems)
+    problems = _checked_problems(problems)
+    shape = checked_count("repetitions", repetitions), len(problems)
     found = Evaluation(
         np.zeros(shape),
         np.full(shape, NO_STATE),
@@ -346,6 +350,12 @@ class _Trial:
             if failed:
                 found.failures[at] += 1
                 values, action_values = agent.planning.values(expected, self.failures.rewards(position, float(expected.max())))
+
+
+def _checked_problems(given: Sequence[ReachTarget]) -> list[ReachTarget]:
+    if isinstance(given, ReachTarget):
+        raise InvalidValue("problems is one ReachTarget: give a list of targets, as [target].")
+    return [checked_target(one) for one in given]
 
 
 def _require_robot(space: Space, plant: ReachPlant) -> None:

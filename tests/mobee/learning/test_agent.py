@@ -431,6 +431,16 @@ def test_a_run_continues_after_interruptions():
     assert agent.transitions == 5 and agent.plant.actions == 8
 
 
+@pytest.mark.parametrize("count", [2.5, -1, True, "3", float("nan")])
+def test_a_number_of_transitions_that_is_no_count_is_refused(count):
+    plant = ToyConcurrent(toy_robot(), {})
+    agent = CuriousAgent(torso(), plant)
+    for start in (agent.run, lambda wanted: run([agent], wanted)):
+        with pytest.raises(InvalidValue, match=f"transitions={count!r}: give a whole number"):
+            start(count)
+    assert agent.transitions == 0
+
+
 def test_a_plant_of_another_robot_is_refused():
     class Other:
         name, motors = "katana", ("base",)

@@ -326,6 +326,27 @@ def test_invalid_arguments_are_refused(options, error, message):
         agent(**options).try_problem(TARGETS[0])
 
 
+@pytest.mark.parametrize("problems", [[GOAL, [0.0, 0.0, 0.2]], np.zeros((2, 3)), GOAL, ["cup"]], ids=["place", "array", "alone", "text"])
+def test_problems_that_are_no_targets_are_refused_before_the_robot_moves(problems):
+    reacher = corridor()
+    acted = []
+    reacher.plant.act = acted.append
+    for start in (reacher.learn, reacher.evaluate):
+        with pytest.raises(InvalidValue, match="ReachTarget"):
+            start(problems, 1)
+    with pytest.raises(InvalidValue, match="must be a ReachTarget"):
+        reacher.try_problem([0.0, 0.0, 0.2])
+    assert not acted and reacher.tries == 0
+
+
+@pytest.mark.parametrize("count", [-1, 1.5, "2"])
+def test_a_number_of_tries_or_repetitions_that_is_no_count_is_refused(count):
+    with pytest.raises(InvalidValue, match=f"tries={count!r}: give a whole number"):
+        corridor().learn([GOAL], count)
+    with pytest.raises(InvalidValue, match=f"repetitions={count!r}: give a whole number"):
+        corridor().evaluate([GOAL], count)
+
+
 def test_a_plant_of_another_robot_is_refused():
     on = plant()
     on.robot = load_robot("katana")
