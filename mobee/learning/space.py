@@ -102,8 +102,9 @@ class Space:
 
     def goal(self, state: int, action: int) -> int:
         """Return the goal state of an action: the state at whose sample it aims. Raises InvalidValue if there is no such action."""
-        if not 0 <= action < self._counts[self._checked_state(state)]:
-            raise InvalidValue(f"state {state} of {self.part} has no action {action!r}: valid are 0 to {self._counts[state] - 1}.")
+        count = self._counts[self._checked_state(state)]
+        if not (isinstance(action, (int, np.integer)) and 0 <= action < count):
+            raise InvalidValue(f"state {state} of {self.part} has no action {action!r}: valid are 0 to {count - 1}.")
         return self.goals.item(state, action)
 
     def state_of(self, q: ArrayLike) -> int:
@@ -181,7 +182,7 @@ class Space:
         return nearest_finder((self.samples - self._low) / self._spans)
 
     def _checked_state(self, state: int) -> int:
-        if not 0 <= state < len(self._counts):
+        if not (isinstance(state, (int, np.integer)) and 0 <= state < len(self._counts)):
             raise InvalidValue(f"{self.part} has no state {state!r}: valid are 0 to {len(self._counts) - 1}.")
         return state
 

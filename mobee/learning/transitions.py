@@ -407,7 +407,7 @@ class TransitionModel(Tabled):
 
     def _check(self, state: int, action: int, outcome: int) -> None:
         self.space.goal(state, action)
-        if not 0 <= outcome < len(self._reward):
+        if not (isinstance(outcome, (int, np.integer)) and 0 <= outcome < len(self._reward)):
             raise InvalidValue(f"{self.space.part} has no state {outcome!r}: valid are 0 to {len(self.space) - 1}.")
 
     def _widen(self) -> None:

@@ -131,9 +131,10 @@ def test_gain_changes_nothing():
 
 def test_unknown_states_actions_and_initialisations_are_refused():
     model = TransitionModel(arm())
-    for s, a, outcome in ((81, 0, 0), (0, 16, 0), (0, 0, 81), (0, 0, -1)):
-        with pytest.raises(InvalidValue, match="valid are 0 to"):
-            model.observe(s, a, outcome)
+    for s, a, outcome in ((81, 0, 0), (0, 16, 0), (0, 0, 81), (0, 0, -1), (1.5, 0, 0), (0, 0.5, 0), (0, 0, 1.5), (0, 0, "1"), (0, None, 0)):
+        for method in (model.observe, model.gain):
+            with pytest.raises(InvalidValue, match="valid are 0 to"):
+                method(s, a, outcome)
     assert model.tries.sum() == 0
     for options, message in (({"initial": "50-5"}, "Did you mean '50-50'"), ({"divergence": "kial"}, "Did you mean 'kail'")):
         with pytest.raises(UnknownName, match=message):
