@@ -15,7 +15,19 @@ from numpy.typing import NDArray
 from mobee.arrays import Array, Ints
 from mobee.errors import InvalidValue
 from mobee.gymnasium.registration import LATTICE_STEPS
-from mobee.gymnasium.robots import ARM, FRAMES_PER_S, SEEDS, Portrait, RobotFile, RobotVectorEnv, WorldFile, model_of, plant_settings, whole
+from mobee.gymnasium.robots import (
+    ARM,
+    FRAMES_PER_S,
+    SEEDS,
+    Portrait,
+    RobotFile,
+    RobotVectorEnv,
+    WorldFile,
+    checked_render_mode,
+    model_of,
+    plant_settings,
+    whole,
+)
 from mobee.learning.goal import target_states
 from mobee.learning.lattice import Lattice, Levels
 from mobee.learning.transitions import TransitionModel
@@ -151,7 +163,7 @@ class LatticeEnv(Env[Any, Any]):
     @accepts(LatticeTask)
     def __init__(self, render_mode: str | None = None, *, settings: LatticeTask | None = None, **changes: Any) -> None:
         self.task = LatticeTask.made(settings, changes)
-        self.render_mode = render_mode
+        self.render_mode = checked_render_mode(render_mode, "rgb_array")
         self._lattice = _Lattice(self.task)
         self.observation_space, self.action_space = self._lattice.observations, self._lattice.actions
         self._arm = _Arm(self._lattice)
@@ -230,6 +242,7 @@ class LatticeVectorEnv(RobotVectorEnv):
     ) -> None:
         self.task = LatticeTask.made(settings, changes)
         self._lattice, self._threads = _Lattice(self.task), threads
+        checked_render_mode(render_mode)
         super().__init__(num_envs, max_episode_steps, self._lattice.observations, self._lattice.actions)
         self._arms = [_Arm(self._lattice) for _ in range(num_envs)]
 

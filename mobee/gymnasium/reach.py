@@ -26,6 +26,7 @@ from mobee.gymnasium.robots import (
     RobotFile,
     RobotVectorEnv,
     WorldFile,
+    checked_render_mode,
     guarded,
     model_of,
     plant_settings,
@@ -190,7 +191,7 @@ class ReachEnv(Env[Any, Any]):
     @accepts(ReachTask)
     def __init__(self, render_mode: str | None = None, *, settings: ReachTask | None = None, **changes: Any) -> None:
         self.task = ReachTask.made(settings, changes)
-        self.render_mode = render_mode
+        self.render_mode = checked_render_mode(render_mode, "rgb_array")
         self._reaching = _Reaching(self.task)
         self.observation_space, self.action_space = self._reaching.observations, self._reaching.actions
         self._robots = self._reaching.robots(1)
@@ -296,6 +297,7 @@ class ReachVectorEnv(RobotVectorEnv):
     ) -> None:
         self.task = ReachTask.made(settings, changes)
         self._reaching = _Reaching(self.task)
+        checked_render_mode(render_mode)
         super().__init__(num_envs, max_episode_steps, self._reaching.observations, self._reaching.actions)
         self._robots = self._reaching.robots(num_envs, threads)
         self._goals = np.zeros((num_envs, 3))

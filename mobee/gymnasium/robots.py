@@ -95,6 +95,13 @@ def whole(what: str, given: Any) -> int:
         raise InvalidValue(f"{what} {given!r}: give a whole number.") from None
 
 
+def checked_render_mode(given: Any, *drawn: str) -> Any:
+    """Return the given render mode; raises InvalidValue unless it is None, or one of the modes that the environment has (`drawn`)."""
+    if given is not None and given not in drawn:
+        raise InvalidValue(f"render_mode={given!r}: give {' or '.join([*map(repr, drawn), 'None'])}.")
+    return given
+
+
 class Portrait:
     """Draws pictures of the robot of a model in its world, always with the same camera."""
 

@@ -13,7 +13,18 @@ from gymnasium.spaces import Discrete
 from gymnasium.utils.seeding import np_random
 
 from mobee.errors import InvalidValue, NotInstalled, UnknownName
-from mobee.gymnasium.robots import ARM, FRAMES_PER_S, SEEDS, Portrait, RobotFile, WorldFile, model_of, plant_settings, whole
+from mobee.gymnasium.robots import (
+    ARM,
+    FRAMES_PER_S,
+    SEEDS,
+    Portrait,
+    RobotFile,
+    WorldFile,
+    checked_render_mode,
+    model_of,
+    plant_settings,
+    whole,
+)
 from mobee.learning.lattice import Lattice, Levels
 from mobee.learning.transitions import TransitionModel
 from mobee.plant import Outcome
@@ -87,7 +98,7 @@ class TableEnv(ParallelEnv[str, int, int]):  # type: ignore[misc]  # PettingZoo 
     @accepts(TableTask)
     def __init__(self, render_mode: str | None = None, *, settings: TableTask | None = None, **changes: Any) -> None:
         self.task = task = TableTask.made(settings, changes)
-        self.render_mode = render_mode
+        self.render_mode = checked_render_mode(render_mode, "rgb_array")
         self._model = model_of(task.robot, task.world)
         if task.neighbours is not NEIGHBOURS and (unknown := [name for name in task.neighbours if name not in task.parts]):
             raise UnknownName("part with neighbours", unknown[0], task.parts)

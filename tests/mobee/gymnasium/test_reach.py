@@ -13,7 +13,7 @@ from gymnasium.utils.env_checker import check_env
 
 import mobee
 from mobee.errors import InvalidValue, MobeeError
-from mobee.gymnasium import ReachEnv, ReachTask, ReachVectorEnv
+from mobee.gymnasium import LatticeEnv, LatticeVectorEnv, ReachEnv, ReachTask, ReachVectorEnv, TableEnv
 from mobee.gymnasium.reach import extent
 from mobee.gymnasium.robots import guarded
 
@@ -144,6 +144,12 @@ def test_a_task_without_a_place_to_rest_and_a_wrong_setting_are_refused() -> Non
     with pytest.raises(InvalidValue, match="'right_palm' is moved by none of l_shoulder_pitch"):
         ReachEnv(marker="right_palm")
     assert ReachTask().reward == "sparse"
+
+
+@pytest.mark.parametrize("made", [ReachEnv, LatticeEnv, TableEnv, ReachVectorEnv, LatticeVectorEnv])
+def test_a_render_mode_that_draws_nothing_is_refused(made: Any) -> None:
+    with pytest.raises(InvalidValue, match="render_mode='human': give .*None"):
+        made(render_mode="human")
 
 
 @pytest.mark.parametrize("action", [0.5, [0.5], [0.5] * 3, np.zeros((4, 1)), [np.nan, 0.0, 0.0, 0.0], "left", [1j] * 4])
