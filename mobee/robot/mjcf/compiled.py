@@ -21,7 +21,7 @@ import numpy as np
 
 from mobee.arrays import Array, Ints
 from mobee.errors import NotInstalled, RobotFileError, Simplified
-from mobee.robot.urdf.tree import Frame
+from mobee.robot.urdf.tree import FARTHEST, Frame
 from mobee.robot.xml.file import LineHandler, is_file, parse_content, read_content
 
 ROOT = "mujoco"  # the root element of an MJCF file
@@ -103,16 +103,21 @@ def held_positions(model: Any, joint_equality: int) -> dict[int, float]:
 def compile_mjcf(path: Path) -> Compiled:
     """Compile an MJCF file with its includes, defaults and meshes.
 
-    Raises RobotFileError with MuJoCo's message if MuJoCo refuses the file, NotInstalled without the package mujoco.
+    Raises RobotFileError with MuJoCo's message if MuJoCo refuses the file, or if the file has a NaN or a place farther than 1e6 m;
+    NotInstalled without the package mujoco.
     """
     try:
         import mujoco
     except ModuleNotFoundError as error:
         raise NotInstalled(f'{path} is an MJCF file, which is read through the package mujoco: pip install "mobee[mjcf]"') from error
     before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda text: None)  # else MuJoCo writes MUJOCO_LOG.TXT into the working directory
+    said: list[str] = []
+    mujoco.set_mju_user_warning(said.append)  # else MuJoCo writes MUJOCO_LOG.TXT into the working directory
     try:
         spec = mujoco.MjSpec.from_file(str(path))
+        if any("NaN" in text for text in said):  # what the compiler says of it does not name the cause
+            problem = "a number in this file, or in one that it includes, is nan"
+            raise RobotFileError(f"{path}: {problem}. Write a decimal number such as -0.25.")
         model = spec.compile()
     except ValueError as error:
         problem = " ".join(str(error).split()).rstrip(".")
@@ -130,6 +135,7 @@ def compile_mjcf(path: Path) -> Compiled:
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)
     mujoco.mj_camlight(model, data)
+    _check_numbers(path, (data.xpos, data.xanchor, data.geom_xpos, data.site_xpos, data.cam_xpos, data.xipos, model.body_mass))
     names, lines = _named(model, mujoco), _lines(spec)
     return Compiled(
         path=path,
@@ -150,6 +156,13 @@ def compile_mjcf(path: Path) -> Compiled:
         wraps=_kinds(mujoco.mjtWrap, "mjWRAP_", model.wrap_type),
         camera_modes=_kinds(mujoco.mjtCamLight, "mjCAMLIGHT_", model.cam_mode),
     )
+
+
+def _check_numbers(path: Path, numbers: Sequence[Array]) -> None:
+    """Raise RobotFileError if one of the numbers, places [m] and masses [kg], is not from -1e6 to 1e6."""
+    if not all((np.abs(some) <= FARTHEST).all() for some in numbers):
+        problem = f"an element is farther than {FARTHEST:g} m from the origin, or heavier than {FARTHEST:g} kg"
+        raise RobotFileError(f"{path}: {problem}. MJCF counts in metres and kilograms: correct its pos, ref or mass.")
 
 
 @lru_cache(maxsize=2)

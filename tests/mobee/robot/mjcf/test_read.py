@@ -204,6 +204,15 @@ def test_masses_are_those_of_mujoco(tmp_path: Path) -> None:
         ('<worldbody><body><geom size=".1"/></body></worldbody>', "no joint moves"),
         ('<worldbody><body><joint/><geom type="mesh" mesh="no"/></body></worldbody>', "MuJoCo refuses this file"),
         ('<asset><mesh file="no.stl"/></asset><worldbody/>', "MuJoCo refuses this file.*no.stl.*Put the file where the MJCF names it"),
+        ('<worldbody><body><joint/><geom size=".1" pos="0 nan 0"/></body></worldbody>', "toy.xml: a number in this file, .* is nan"),
+        (
+            '<worldbody><body><joint/><geom size=".1"/><site pos="0 inf 0"/></body></worldbody>',
+            "toy.xml: an element is farther than 1e.06 m",
+        ),
+        (
+            '<worldbody><body><joint/><geom size=".1"/></body></worldbody><keyframe><key name="home" qpos="nan"/></keyframe>',
+            "toy.xml: a number in this file, .* is nan. Write a decimal number",
+        ),
         ("<worldbodi/>", "toy.xml:2: MuJoCo refuses this file.*worldbodi"),
     ],
 )
