@@ -21,6 +21,7 @@ import numpy as np
 
 from mobee.arrays import Array, Ints
 from mobee.errors import NotInstalled, RobotFileError, Simplified
+from mobee.robot.urdf.motors import LEAST
 from mobee.robot.urdf.tree import FARTHEST, Frame
 from mobee.robot.xml.file import LineHandler, is_file, parse_content, read_content
 
@@ -55,13 +56,14 @@ def is_mjcf(path: Path) -> bool:
 class Compiled:
     """A model as MuJoCo compiles it, with hinges and slides at zero; lists are in the order of MuJoCo's ids.
 
-    Joints that an equality with a single joint fixes are at their fixed positions. `path`: path of the file. `model`: MuJoCo's MjModel, a
-    table of arrays. `bodies`, `inertial`, `geoms`, `sites`, `cameras`: the frames of these elements in the world's frame; `inertial`: at
+    Joints that an equality fixes are at their fixed positions. `path`: path of the file. `model`: MuJoCo's MjModel, a table of arrays.
+    `bodies`, `inertial`, `geoms`, `sites`, `cameras`: the frames of these elements in the world's frame; `inertial`: at
     the centres of mass. `anchors` (m), `axes`: (joints, 3), a point on the axis and the unit axis of each joint, in the world's frame.
     `names[kind]`: the names of the elements of a kind ("body", "joint", "geom", "site", "key" and so on); an element without a name gets
     one from its kind and number. `lines[kind]`: the lines of these elements in the file; 0 if MuJoCo does not record the line.
     `joint_kinds`, `geom_kinds`, `equality_kinds`, `camera_modes`: MuJoCo's type of each such element as text, for example "hinge".
-    `transmissions`: what each actuator acts on, for example "joint". `wraps`: type of each element of all tendons.
+    `transmissions`: what each actuator acts on, for example "joint". `wraps`: type of each element of all tendons. `held`: numbers of the
+    joints that an equality fixes.
     """
 
     path: Path
@@ -81,6 +83,7 @@ class Compiled:
     transmissions: tuple[str, ...]  # of actuators: joint, jointinparent, tendon, site, ...
     wraps: tuple[str, ...]  # elements of tendons: joint, site, sphere, ...
     camera_modes: tuple[str, ...]  # fixed, track, ...
+    held: frozenset[int]
 
     def where(self, kind: str, index: int) -> str:
         """Return "file:line" of an element; `kind`: a key of the dict `names`, `index`: MuJoCo's id of the element."""
@@ -91,11 +94,13 @@ KINDS = ("body", "joint", "geom", "site", "key", "equality", "actuator", "tendon
 
 
 def held_positions(model: Any, joint_equality: int) -> dict[int, float]:
-    """Return the position [rad or m] of each joint that an equality with a single joint fixes; the keys are MuJoCo's joint numbers.
+    """Return the position [rad or m] of each joint that a joint equality fixes; the keys are MuJoCo's joint numbers.
 
-    `model`: MuJoCo's model. `joint_equality`: MuJoCo's number of this kind of equality, mjEQ_JOINT.
+    Such an equality has a single joint, or a polynomial of the other joint that is constant. `model`: MuJoCo's model. `joint_equality`:
+    MuJoCo's number of this kind of equality, mjEQ_JOINT.
     """
-    fixed = np.flatnonzero((model.eq_type == int(joint_equality)) & (model.eq_active0 != 0) & (model.eq_obj2id < 0)).tolist()
+    constant = (model.eq_obj2id < 0) | (np.abs(model.eq_data[:, 1:5]) < LEAST).all(axis=1)
+    fixed = np.flatnonzero((model.eq_type == int(joint_equality)) & (model.eq_active0 != 0) & constant).tolist()
     joints = model.eq_obj1id[fixed].tolist()
     return {joint: float(model.qpos0[model.jnt_qposadr[joint]] + model.eq_data[k, 0]) for k, joint in zip(fixed, joints, strict=True)}
 
@@ -130,7 +135,8 @@ def compile_mjcf(path: Path) -> Compiled:
     kinds = _kinds(mujoco.mjtJoint, "mjJNT_", model.jnt_type)
     moving = [kind in ("hinge", "slide") for kind in kinds]
     data.qpos[model.jnt_qposadr[moving]] = 0.0
-    for joint, position in held_positions(model, mujoco.mjtEq.mjEQ_JOINT).items():
+    held = held_positions(model, mujoco.mjtEq.mjEQ_JOINT)
+    for joint, position in held.items():
         data.qpos[model.jnt_qposadr[joint]] = position
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)
@@ -155,6 +161,7 @@ def compile_mjcf(path: Path) -> Compiled:
         transmissions=_kinds(mujoco.mjtTrn, "mjTRN_", model.actuator_trntype),
         wraps=_kinds(mujoco.mjtWrap, "mjWRAP_", model.wrap_type),
         camera_modes=_kinds(mujoco.mjtCamLight, "mjCAMLIGHT_", model.cam_mode),
+        held=frozenset(held),
     )
 
 

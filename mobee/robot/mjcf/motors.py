@@ -108,8 +108,7 @@ def drives_of(compiled: Compiled) -> dict[int, Drive]:
     the group that has an actuator; if none has one, that of the joint that does not depend on another. Joints that an equality holds at a
     constant position have no drive.
     """
-    held = held_joints(compiled)
-    moving = [j for j, kind in enumerate(compiled.joint_kinds) if kind in ("hinge", "slide") and j not in held]
+    moving = [j for j, kind in enumerate(compiled.joint_kinds) if kind in ("hinge", "slide") and j not in compiled.held]
     links: dict[int, list[Line]] = defaultdict(list)
     slaves: set[int] = set()
     for one, other, scale, offset in (*_equalities(compiled), *_tendons(compiled)):
@@ -133,15 +132,6 @@ def drives_of(compiled: Compiled) -> dict[int, Drive]:
                     drives[one] = Drive(master, scale * drives[known].scale, scale * drives[known].offset + offset)
                     waiting.append(one)
     return drives
-
-
-def held_joints(compiled: Compiled) -> set[int]:
-    """Return MuJoCo's numbers of the joints that an equality with a single joint fixes.
-
-    In `compiled`, the frames of the bodies belong to the pose with these joints at their fixed positions.
-    """
-    model = compiled.model
-    return {int(model.eq_obj1id[k]) for k in _active(compiled, "joint") if model.eq_obj2id[k] < 0}
 
 
 def actuated(compiled: Compiled) -> dict[int, list[int]]:

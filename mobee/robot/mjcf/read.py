@@ -15,7 +15,7 @@ from mobee.arrays import Array
 from mobee.errors import InvalidValue, RobotFileError, Simplified
 from mobee.robot.bodies import one_a_link
 from mobee.robot.mjcf.compiled import Compiled, compile_mjcf
-from mobee.robot.mjcf.motors import drives_of, held_joints, home_pose, loops, read_motor
+from mobee.robot.mjcf.motors import drives_of, home_pose, loops, read_motor
 from mobee.robot.mjcf.shapes import WITHOUT_BODY, read_cameras, read_solids, read_visuals
 from mobee.robot.robot import Body, Joint, Marker, Motor, Part, Robot, Shape
 from mobee.robot.urdf.motors import Drive
@@ -189,7 +189,7 @@ def _warn(compiled: Compiled) -> None:
     names = compiled.names
     free = [names["joint"][k] for k, kind in enumerate(compiled.joint_kinds) if kind == "free"]
     balls = [names["joint"][k] for k, kind in enumerate(compiled.joint_kinds) if kind == "ball"]
-    fixed = [names["joint"][k] for k in held_joints(compiled)]
+    fixed = [names["joint"][k] for k in sorted(compiled.held)]
     ground = [names["geom"][k] for k, kind in enumerate(compiled.geom_kinds) if kind in WITHOUT_BODY]
     for found, text in (
         (free, "moves freely: it is held where the file places it, as this library has no floating base"),

@@ -80,10 +80,14 @@ def test_an_equality_gives_two_joints_one_motor(tmp_path: Path) -> None:
     assert robot.motor_table[robot.motor_index("knee")].max_torque == pytest.approx(50.0)
 
 
-def test_a_joint_that_an_equality_holds_stays_at_its_position(tmp_path: Path) -> None:
-    held = '<equality><joint joint1="elbow" polycoef="0.7 0 0 0 0"/></equality>'
+@pytest.mark.parametrize("other", ["", 'joint2="roll"'])
+def test_a_joint_that_an_equality_holds_stays_at_its_position(tmp_path: Path, other: str) -> None:
+    held = f'<equality><joint joint1="elbow" {other} polycoef="0.7 0 0 0 0"/></equality>'
     path = mjcf_file(tmp_path, TREE + held)
-    robot, free = read(path), read(mjcf_file(tmp_path, TREE))
+    with pytest.warns(Simplified) as caught:
+        robot = load_robot(path)
+    assert any("elbow is held by an equality" in str(one.message) for one in caught)
+    free = read(mjcf_file(tmp_path, TREE))
     assert set(free.motors) - set(robot.motors) == {"elbow"}
     turned = free.home.copy()
     turned[free.motor_index("elbow")] = 0.7 + np.deg2rad(-20.0)  # beside its reference position
