@@ -21,6 +21,7 @@ from mobee.errors import ActionInterrupted, InvalidValue, MobeeError, UnknownNam
 from mobee.plant import Outcome
 from mobee.reach import Aim, ReachOutcome, ReachTarget
 from mobee.robot.robot import Robot
+from services.common.hands import require_apart
 from services.common.lockstep import Participant
 from services.common.reach_client import TRIES, ReachClient
 from services.common.rpc import CallFailed
@@ -166,12 +167,15 @@ class BusPlant:
 
         The force ends when the part has settled or timed out. Then the attractor (the posture to which the controller moves the part) pulls
         the part back, or, with `stay`, the part stays where the force ended. Implements `mobee.reach.ReachPlant.reach`. Raises UnknownName
-        for an unknown marker; InvalidValue if no target is presented or the part does not move the marker; ActionInterrupted if the part is
-        in hold (it stands still and follows no commands) or has a fault; if robot_sim starts a new run; if the controller ends; or if the
-        controller gives the part's goal to another service.
+        for an unknown marker; InvalidValue if no target is presented, the part does not move the marker, or it moves the target, which is
+        attached to a link, together with the marker; ActionInterrupted if the model does not answer; if the part is in hold (it stands
+        still and follows no commands) or has a fault; if robot_sim starts a new run; if the controller ends; or if the controller gives the
+        part's goal to another service.
         """
         self.robot.marker(marker)
-        sent = self._perform(part, "reach", ReachFor, marker=marker, stay=stay, **self._reaches.asked())
+        asked = self._reaches.asked()
+        require_apart(self.robot, part, marker, *self._reaches.attached_to())
+        sent = self._perform(part, "reach", ReachFor, marker=marker, stay=stay, **asked)
         after = self._outcome(part, sent)
         return self._reaches.outcome(part, self._motion[part], after, self._tick)
 

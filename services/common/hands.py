@@ -89,9 +89,29 @@ def hand_for(robot: Robot, place: Array | None) -> str:
     return next(name for name, distance in zip(hands, far, strict=True) if distance < min(far) + EQUAL_DISTANCE)
 
 
+def require_apart(robot: Robot, part: str, marker: str, name: str, link: str) -> None:
+    """Raise InvalidValue if a motor of a part moves an object together with the marker with which the part is to reach for the object.
+
+    `name`: of the object. `link`: name of the link to which it is attached; empty: it is attached to none. Raises UnknownName for an
+    unknown marker.
+    """
+    if not link:
+        return
+    together = {*_motors_before(robot, marker)} & {*_motors_of(robot, robot.links.index(link))}
+    if any(robot.motor_table[motor].part == part for motor in together):
+        raise InvalidValue(
+            f"{name!r} is attached to the link {link!r}, which {part} moves together with the marker {marker!r}, so that a reach would not "
+            "end: detach it, or reach for it with a part that does not move this link."
+        )
+
+
 def _motors_before(robot: Robot, marker: str) -> list[int]:
     """Return the motors that move a marker, the nearest one in the tree first."""
-    link = robot.marker(marker).link
+    return _motors_of(robot, robot.marker(marker).link)
+
+
+def _motors_of(robot: Robot, link: int) -> list[int]:
+    """Return the motors that move a link, the nearest one in the tree first."""
     chain: list[int] = []
     while link > 0:
         chain += np.flatnonzero(robot.coupling[0][link - 1]).tolist()

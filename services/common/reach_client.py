@@ -87,6 +87,15 @@ class ReachClient:
             "faces": target.faces,
         }
 
+    def attached_to(self) -> tuple[str, str]:
+        """Return the names of the presented object and of the link to which it is attached; the second is empty if there is none.
+
+        Raises ActionInterrupted if the model does not answer.
+        """
+        if self._object == TARGET:  # this service has put it there
+            return TARGET, ""
+        return self._object, next((one.link for one in self._listed().objects if one.name == self._object), "")
+
     def has_ended(self, part: str, action_id: str) -> bool:
         """Return whether the controller has reported that the force of a part's reach has ended. `action_id`: id of this reach."""
         reach = self._reaches.get(part)

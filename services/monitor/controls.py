@@ -39,7 +39,7 @@ from mobee.errors import MobeeError
 from mobee.reach import TARGET
 from mobee.robot.robot import Robot
 from services.common.emergency_stop import SILENCE, StopRecord, StopSender
-from services.common.hands import hand_for, hand_of, part_of
+from services.common.hands import hand_for, hand_of, part_of, require_apart
 from services.common.reach_client import inner_radius
 from services.common.rpc import CallFailed
 from services.common.service import Service
@@ -256,7 +256,7 @@ class PageControls:
         return f"The {title_of(part)} moves."
 
     def _reach(self, given: dict[str, Any]) -> str:
-        name, radius = given.get("object"), PLACE_RADIUS
+        name, radius, link = given.get("object"), PLACE_RADIUS, ""
         place = _place_of(given["position"]) if "position" in given else None
         if name is not None:
             found = self._known.objects.get(str(name))
@@ -265,11 +265,12 @@ class PageControls:
                 raise Refused(f"the model knows no {name}, only {known}: vision must see it. Click a place instead, then H")
             if found.role != "target":
                 raise Refused(f"{name} has the role {found.role}; hands reach for targets only. Click a place instead")
-            place, radius = np.array(found.position), inner_radius(found)
+            place, radius, link = np.array(found.position), inner_radius(found), found.link
         if place is None:
             raise Refused("click a place, or name an object")
         hand = hand_for(self._robot, place) if not given.get("part") else hand_of(self._robot, self._part(given))
         part = part_of(self._robot, hand)
+        require_apart(self._robot, part, hand, str(name), link)
         before = self._taken.get(part)
         taken = self._take(part)
         asked = {"marker": hand, "object": name or TARGET, "position": place.tolist(), "radius": radius, "aim": "surface", "stay": True}

@@ -6,6 +6,9 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from bus_schema import VERSION, keys
+from bus_schema.messages import Geometry
+from bus_schema.rpc import Empty, ObjectState, World
 from mobee import load_robot
 from mobee.errors import InvalidValue, MobeeError, UnknownName
 from services.common.bus_plant import BusPlant
@@ -21,6 +24,8 @@ ROBOT = load_robot("icub")
 def plant(tmp_path_factory: pytest.TempPathFactory) -> Iterator[BusPlant]:
     with rig(tmp_path_factory.mktemp("plant"), ROBOT) as made, Service("test", ServiceConfig(endpoint=made.endpoint), ROBOT) as service:
         controller = FakeController(made, "torso")
+        ball = ObjectState("ball", Geometry("sphere", [0.03]), [-0.3, 0.1, 0.1], [1.0, 0.0, 0.0, 0.0], role="target", link="l_hand")
+        made.serve(keys.world_rpc("list"), Empty, lambda *_: World(v=VERSION, objects=[ball]))
         yield BusPlant(service, ROBOT, ("torso",))
         controller.close()
 
@@ -45,3 +50,9 @@ def test_a_part_of_the_robot_that_is_not_one_of_the_plant_is_not_measured(plant:
     with pytest.raises(UnknownName, match="part of this plant"):
         plant.measure("head")
     assert len(plant.measure("torso")) == 3
+
+
+def test_an_object_that_the_part_carries_with_the_marker_is_not_reached_for(plant: BusPlant) -> None:
+    plant.present_object("ball")
+    with pytest.raises(InvalidValue, match="'ball' is attached to the link 'l_hand', which torso moves"):
+        plant.reach("torso", "right_palm")

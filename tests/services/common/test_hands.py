@@ -8,7 +8,7 @@ import pytest
 
 from mobee.errors import InvalidValue, UnknownName
 from mobee.robot.load import load_robot
-from services.common.hands import end_markers, hand_for, hand_of, moved_markers, part_of
+from services.common.hands import end_markers, hand_for, hand_of, moved_markers, part_of, require_apart
 from tests.services.robots import ARM, chain, seer
 
 ICUB = load_robot("icub")
@@ -29,6 +29,19 @@ def test_the_part_of_a_marker_is_that_with_most_motors_before_it(marker: str, pa
 @pytest.mark.parametrize(("y", "marker"), [(-0.3, "left_palm"), (0.3, "right_palm"), (0.0, "right_palm")])
 def test_the_palm_on_the_side_of_the_target_is_taken(y: float, marker: str) -> None:
     assert hand_for(ICUB, np.array([-0.3, y, 0.1])) == marker
+
+
+@pytest.mark.parametrize(
+    ("part", "link"), [("right_arm", "r_hand"), ("right_arm", "r_hand_thumb_3"), ("right_arm", "r_forearm"), ("torso", "l_hand")]
+)
+def test_an_object_that_the_reaching_part_carries_is_refused(part: str, link: str) -> None:
+    with pytest.raises(InvalidValue, match=f"'ball' is attached to the link '{link}', which {part} moves .* detach it"):
+        require_apart(ICUB, part, "right_palm", "ball", link)
+
+
+@pytest.mark.parametrize(("part", "link"), [("right_arm", "l_hand"), ("right_arm", "chest"), ("torso", "root_link"), ("torso", "")])
+def test_an_object_that_another_part_carries_is_not_refused(part: str, link: str) -> None:
+    require_apart(ICUB, part, "right_palm", "ball", link)
 
 
 def test_another_robot_reaches_with_the_end_of_its_chain(tmp_path: Path) -> None:

@@ -109,6 +109,16 @@ def test_an_object_is_reached_for_as_the_sphere_in_its_middle(
     assert [verb for verb, _ in service.calls] == ["list"]
 
 
+def test_the_link_of_the_object_is_that_at_the_reach(service: FakeService, client: ReachClient) -> None:
+    service.objects = [ball := thing("ball", "sphere", [0.03])]
+    client.present_object("ball")
+    assert client.attached_to() == ("ball", "")
+    service.objects = [replace(ball, link="r_hand")]  # the hand has closed
+    assert client.attached_to() == ("ball", "r_hand")
+    client.present(ReachTarget(np.array(AT)))
+    assert client.attached_to() == (TARGET, "")
+
+
 def test_a_stale_object_is_refused_and_a_margin_of_its_shape_does_not_count(service: FakeService, client: ReachClient) -> None:
     service.stale = {"ball": 7.26}
     with pytest.raises(InvalidValue, match="'ball' is stale: the newest picture that shows it is 7.3 s old, and it may be elsewhere"):

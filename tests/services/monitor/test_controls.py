@@ -166,6 +166,16 @@ def test_a_page_reaches_for_the_sphere_within_an_object_without_the_margin_of_it
     assert clicked.reached["radius"] == pytest.approx(0.012)
 
 
+def test_a_hand_does_not_reach_for_an_object_that_it_holds(clicked: Clicked) -> None:
+    sphere = Geometry("sphere", [0.03])
+    clicked.known.objects["ball"] = ObjectState("ball", sphere, PLACE, [1.0, 0.0, 0.0, 0.0], role="target", link="r_hand")
+    with pytest.raises(Refused, match="'ball' is attached to the link 'r_hand', which right_arm moves"):
+        clicked.do("reach", object="ball", part="right_arm")
+    assert not clicked.made
+    clicked.do("reach", object="ball", part="left_arm")
+    assert clicked.reached["marker"] == "left_palm"
+
+
 def test_the_explorer_changes_for_the_agents_that_run(clicked: Clicked) -> None:
     clicked.alive |= {"agent_left_arm": {"a"}, "agent_torso": set()}  # the second has ended
     assert "left arm explore" in clicked.do("explore", explorer="random")
