@@ -18,6 +18,7 @@ from mobee.robot.motor_units import angle_unit, outside_zones
 from mobee.robot.robot import Motor
 from mobee.robot.urdf.motors import LEAST, SLIDE, TURN, Drive
 from mobee.robot.urdf.srdf import HOMES, ZERO
+from mobee.robot.urdf.tree import FARTHEST
 
 NARROWEST = 1e-6  # rad or m: couplings that leave a motor less are not used to limit it
 Line = tuple[int, int, float, float]  # joint one = scale * joint other + offset
@@ -26,13 +27,14 @@ Line = tuple[int, int, float, float]  # joint one = scale * joint other + offset
 def joint_limits(compiled: Compiled, joint: int) -> Array:
     """Return the lower and upper limit (2,) of a joint, rad or m; without limits: -pi to pi, or -1 to 1 m for a slide.
 
-    `joint`: MuJoCo's number of the joint.
+    A limit beyond 1e6 counts as infinite; the joint then has the same interval, from its other limit if that is finite. `joint`: MuJoCo's
+    number of the joint.
     """
-    if compiled.model.jnt_limited[joint]:
-        stated: Array = compiled.model.jnt_range[joint].copy()
-        return stated
+    low, high = compiled.model.jnt_range[joint].tolist() if compiled.model.jnt_limited[joint] else (-np.inf, np.inf)
     span = SLIDE if compiled.joint_kinds[joint] == "slide" else TURN
-    return np.array([-span / 2.0, span / 2.0])
+    if low < -FARTHEST and high > FARTHEST:
+        return np.array([-span / 2.0, span / 2.0])
+    return np.array([low if low >= -FARTHEST else high - span, high if high <= FARTHEST else low + span])
 
 
 def home_pose(compiled: Compiled, asked: str | None) -> tuple[Array, int | None]:
@@ -83,7 +85,7 @@ def read_motor(compiled: Compiled, group: list[tuple[int, int, Drive]], home: Ar
 
 
 def _torque(compiled: Compiled, joints: list[int]) -> float:
-    """Return the largest torque [N m], or force [N], that the actuators of the joints are given; 0 where the file gives none."""
+    """Return the largest torque [N m], or force [N], that the actuators of the joints are given; 0 if the file gives none, or inf."""
     model, own = compiled.model, actuated(compiled)
     largest = 0.0
     for joint in joints:
@@ -97,7 +99,7 @@ def _torque(compiled: Compiled, joints: list[int]) -> float:
             elif model.actuator_ctrllimited[actuator] and not model.actuator_biasprm[actuator].any():  # a motor: force = gain * control
                 gain = abs(float(model.actuator_gainprm[actuator, 0]))
                 largest = max(largest, gear * gain * float(np.abs(model.actuator_ctrlrange[actuator]).max()))
-    return largest
+    return largest if np.isfinite(largest) else 0.0
 
 
 def drives_of(compiled: Compiled) -> dict[int, Drive]:

@@ -13,6 +13,7 @@ from mobee.arrays import Array
 from mobee.robot.motor_units import angle_unit, outside_zones
 from mobee.robot.robot import Motor
 from mobee.robot.urdf.tree import FARTHEST, UrdfJoint, bounded, child, read_name
+from mobee.robot.xml.node import FARTHEST as HIGHEST
 from mobee.robot.xml.node import Node, listed, nearest
 
 LEAST = 1e-6  # of a factor between a joint and its motor
@@ -107,13 +108,13 @@ def stated_limits(joint: UrdfJoint) -> Array:
     return np.array([low, high])
 
 
-def _or_infinite(limit: Node, name: str) -> float:
-    """Return a number of a <limit>, 0 if it is left out; infinite if it is larger than any joint's position or velocity can be."""
+def _or_infinite(limit: Node, name: str, farthest: float = FARTHEST) -> float:
+    """Return a number of a <limit>, 0 if it is left out; infinite if it is above `farthest`, which no joint can reach."""
     try:
         value = float(limit.optional(name))
     except ValueError:
         value = 0.0
-    return copysign(inf, value) if abs(value) > FARTHEST else limit.number(name, 0.0)
+    return copysign(inf, value) if abs(value) > farthest else limit.number(name, 0.0)
 
 
 def _warn_of_free(joint: UrdfJoint) -> None:
@@ -164,13 +165,13 @@ def _limited(master: UrdfJoint, motor: Motor) -> Motor:
     limit = child(master.node, "limit")
     if limit is None:
         return motor
-    velocity, effort = _or_infinite(limit, "velocity"), limit.number("effort", 0.0)
+    velocity, effort = _or_infinite(limit, "velocity"), _or_infinite(limit, "effort", HIGHEST)
     slides = master.kind == "prismatic"
     _warn_if_negative(limit, "velocity", velocity, f"{motor.max_velocity:.4g} {'m/s' if slides else 'rad/s'}")
     _warn_if_negative(limit, "effort", effort, f"{motor.max_torque:.4g} {'N' if slides else 'N m'}")
-    if 0 < velocity < inf:  # exporters write 0 for an unknown value
+    if 0 < velocity < inf:  # exporters write 0 for an unknown value, or inf
         motor = replace(motor, max_velocity=velocity)
-    return replace(motor, max_torque=effort) if effort > 0 else motor
+    return replace(motor, max_torque=effort) if 0 < effort < inf else motor
 
 
 def _warn_if_negative(limit: Node, name: str, value: float, default: str) -> None:

@@ -71,6 +71,17 @@ def test_links_move_as_in_mujoco(tmp_path: Path) -> None:
     assert worst_pose_error(path, robot, seed=1) < 1e-9
 
 
+@pytest.mark.parametrize(
+    ("given", "limits"), [("-inf inf", [-np.pi, np.pi]), ("-1 1e10", [-1.0, 2 * np.pi - 1.0]), ("-inf 1", [1 - 2 * np.pi, 1.0])]
+)
+def test_infinite_limits_and_forces_mean_unknown(tmp_path: Path, given: str, limits: list[float]) -> None:
+    text = f'<compiler angle="radian"/><worldbody><body><joint name="a" range="{given}"/><geom size=".1"/></body></worldbody>'
+    robot = read(mjcf_file(tmp_path, f'{text}<actuator><motor joint="a" forcerange="-inf inf"/></actuator>'))
+    assert robot.limits[0] == pytest.approx(limits)
+    assert robot.motor_table[0].max_torque == 40.0
+    assert_same_robot(load_robot(write_xml(robot, tmp_path / "written.xml")), robot)
+
+
 def test_an_equality_gives_two_joints_one_motor(tmp_path: Path) -> None:
     robot = read(mjcf_file(tmp_path, TREE + COUPLED))
     finger = robot.motor_table[robot.motor_index("f2")]

@@ -142,6 +142,11 @@ def test_a_mimic_without_limits_leaves_its_motor_its_own(tmp_path: Path) -> None
     assert robot.limits.tolist() == [[-3, 0.5]]
 
 
+def test_an_infinite_velocity_or_effort_means_unknown(tmp_path: Path) -> None:
+    robot = fingers(tmp_path, '<limit lower="0" upper="1" velocity="inf" effort="inf"/>')
+    assert (robot.motor_table[0].max_velocity, robot.motor_table[0].max_torque) == (np.deg2rad(60), 40)
+
+
 def test_a_velocity_beyond_measure_means_unknown(tmp_path: Path) -> None:
     robot = fingers(tmp_path, '<limit lower="0" upper="1" velocity="1e16" effort="5"/>')
     assert (robot.motor_table[0].max_velocity, robot.motor_table[0].max_torque) == (np.deg2rad(60), 5)
