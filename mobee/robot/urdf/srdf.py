@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from mobee.errors import UnknownName
+from mobee.errors import Simplified, UnknownName
 from mobee.robot.robot import Motor
 from mobee.robot.urdf.motors import Drive
-from mobee.robot.urdf.tree import Tree, UrdfJoint, bounded
+from mobee.robot.urdf.tree import Tree, UrdfJoint, bounded, child
 from mobee.robot.xml.node import Node, nearest, read_xml, shown
 
 NamePair = frozenset[str]
@@ -54,7 +54,7 @@ def find_srdf(urdf: Path, robot: str) -> Path | None:
 
 
 def read_srdf(path: Path, tree: Tree) -> Srdf:
-    """Return the content of an SRDF file; warns of links, joints and groups that the robot does not have.
+    """Return the content of an SRDF file; warns of links, joints and groups that the robot does not have, and of passive joints.
 
     `tree`: links and joints of the robot's URDF. Raises RobotFileError if the file cannot be read, is not an SRDF file, has too many
     groups, or has a missing or faulty attribute.
@@ -89,6 +89,11 @@ def read_srdf(path: Path, tree: Tree) -> Srdf:
     for node in root:
         if node.tag == "group_state":
             srdf.states.setdefault(node.text("name"), {}).update(read_state(node, tree.joints, virtual))
+        elif node.tag == "passive_joint" and node.text("name") not in virtual:
+            for name in _known(node, "name", tree.joints):
+                if tree.joints[name].kind != "fixed" and child(tree.joints[name].node, "mimic") is None:
+                    remedy = 'If it follows another joint, write <mimic> in the URDF; if nothing moves it, write type="fixed"'
+                    node.warn(f"joint {name!r} gets a motor, as this library has no passive joints. {remedy}", Simplified)
     return srdf
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from mobee.errors import RobotFileError
+from mobee.errors import RobotFileError, Simplified
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
 from mobee.robot.urdf.read import UrdfOptions, read_urdf
@@ -162,6 +162,15 @@ def test_a_chain_that_the_robot_does_not_have_is_passed_over(tmp_path: Path, cha
     with pytest.warns(UserWarning, match="toy.srdf:2: <chain>: the robot has no '(bse|plam)', so this is ignored. Did you mean"):
         robot = read(tmp_path, f'<group name="arm"><chain {chain}/><joint name="elbow"/><joint name="shoulder"/></group>', GROUPS[0])
     assert robot.parts["arm"].motors == ("elbow", "shoulder")
+
+
+def test_passive_joints_that_get_a_motor_are_named(tmp_path: Path) -> None:
+    virtual = '<virtual_joint name="world" type="planar" parent_frame="map" child_link="base"/>'
+    with pytest.warns() as caught:
+        robot = read(tmp_path, virtual, *(f'<passive_joint name="{name}"/>' for name in ("world", "r", "wrist", "elbow")))
+    assert robot.motors == ("shoulder", "elbow", "l")
+    assert [one.category for one in caught] == [Simplified]
+    assert "toy.srdf:6: <passive_joint>: joint 'elbow' gets a motor, as this library has no passive joints" in str(caught[0].message)
 
 
 def test_more_groups_than_a_robot_can_have_are_refused(tmp_path: Path) -> None:
