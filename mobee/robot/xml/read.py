@@ -278,6 +278,10 @@ def _name_base(node: Node, draft: Draft) -> None:
     name = node.text("name")
     if name in draft.links[1:]:
         node.fail("name", f"a second link {name!r}", "Give the base a name of its own")
+    before = draft.where.get(("link", draft.links[0]))
+    if before and name != draft.links[0]:
+        problem = f"a second name of the base, {name!r}, replaces {draft.links[0]!r} (line {before.rpartition(':')[2]})"
+        node.warn(f"{problem}: links outside of every joint are one link, the base. Keep one name")
     draft.links[0] = name
     draft.note("link", name, node)
 

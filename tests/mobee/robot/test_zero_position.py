@@ -182,6 +182,13 @@ def test_unknown_tags_and_attributes_are_ignored_with_a_warning_that_names_the_l
         assert len(read_robot(path).shapes) == 1
 
 
+def test_a_second_name_of_the_base_is_reported(tmp_path: Path) -> None:
+    links = ('<link name="pelvis" z="1"/>', '<link name="pelvis" x="1"/>', '<link name="foot" z="-1"/>')
+    with pytest.warns(UserWarning, match=r"toy.xml:6: <link>: a second name of the base, 'foot', replaces 'pelvis' \(line 4\)"):
+        robot = read(tmp_path, '<bodypart name="arm">', MOTOR, *links, "</bodypart>")
+    assert robot.links == ("foot", "pan")
+
+
 def test_unknown_tags_are_ignored_wherever_they_stand(tmp_path: Path) -> None:
     for line in (
         "<constraintList><note/><constraint a='1' q='0' b='180'/></constraintList>",
