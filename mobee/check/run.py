@@ -38,6 +38,10 @@ from mobee.robot.xml.versions import CONVERT, WORLD_TAGS, upgrade_robot, upgrade
 Check = Callable[[Subject], Iterator[Finding]]
 
 KEY = re.compile(r"[a-z0-9_]+")  # a name that is valid in a key of the bus
+# A file name may contain ":3: " too, so the place is best found by the ending of the name.
+MESSAGE = re.compile(
+    r"(?P<where>(?:.+?\.(?:xml|mjcf|urdf|srdf)|.+?):\d+): (?P<what>[^.]*(?:\.[^ ][^.]*)*)\.? ?(?P<remedy>.*)", re.DOTALL | re.IGNORECASE
+)
 FAR = 10.0  # m from the origin: no robot reaches there
 TINY = 1e-3  # m
 THIN = 0.02  # m: at 2 m/s and 100 Hz a hand moves this far between two ticks
@@ -265,7 +269,7 @@ def _collected_warnings(warned: list[Finding]) -> Iterator[None]:
         warnings.simplefilter("always")
         yield
     for warning in caught:
-        found = re.match(r"(?P<where>.+?:\d+): (?P<what>[^.]*(?:\.[^ ][^.]*)*)\.? ?(?P<remedy>.*)", str(warning.message), re.DOTALL)
+        found = MESSAGE.match(str(warning.message))
         where, what, remedy = found.group("where", "what", "remedy") if found else ("", str(warning.message), "")
         severity: Severity = "note" if issubclass(warning.category, Simplified) else "warning"
         warned.append(Finding(severity, "reader", where, what, "the robot differs from what the file says", remedy))

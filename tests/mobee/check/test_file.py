@@ -13,8 +13,9 @@ from tests.mobee.check.arm import ARM
 from tests.mobee.robot.robot_files import robot_file
 
 
-def test_a_warning_of_the_reader_is_a_finding_with_its_line(tmp_path: Path) -> None:
-    path = robot_file(tmp_path, *ARM.replace("<marker", '<jont z="1"/><marker').splitlines())
+@pytest.mark.parametrize("name", ["toy.xml", "a:3: b.XML"])
+def test_a_warning_of_the_reader_is_a_finding_with_its_line(tmp_path: Path, name: str) -> None:
+    path = robot_file(tmp_path, *ARM.replace("<marker", '<jont z="1"/><marker').splitlines()).rename(tmp_path / name)
     checked = check_file(path)
     (finding,) = checked.findings
     assert isinstance(checked.content, Robot)
