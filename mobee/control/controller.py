@@ -12,7 +12,18 @@ from numpy.typing import NDArray
 from mobee._core import Table
 from mobee._core.law import state_term_names, term_names
 from mobee.arrays import Array
-from mobee.control.forces import Forces, Propagate, State, Term, checked, checked_force, forces_of, valid_terms
+from mobee.control.forces import (
+    Forces,
+    Propagate,
+    State,
+    Term,
+    checked,
+    checked_force,
+    forces_of,
+    require_forces,
+    require_pose_of,
+    valid_terms,
+)
 from mobee.control.gains import Gains
 from mobee.control.law import Command, Law, Modality, largest_step, require_stable
 from mobee.control.reach_forces import ReachForces
@@ -76,8 +87,8 @@ class Controller:
             raise InvalidValue(f"model is {model!r}; it must be a Model, as Model(robot, world).")
         if not isinstance(gains, Gains | None):
             raise InvalidValue(f"gains is {gains!r}; it must be Gains, as Gains.default() or Gains.named(name), or None.")
-        if not 0 < speed_scale <= 1:
-            raise InvalidValue(f"speed_scale {speed_scale}: must be above 0 and at most 1")
+        if not (isinstance(speed_scale, int | float | np.number) and 0 < speed_scale <= 1):
+            raise InvalidValue(f"speed_scale {speed_scale!r}: must be above 0 and at most 1")
         if modality not in ("position", "velocity", "torque"):
             raise UnknownName("modality", modality, ("position", "velocity", "torque"))
         if propagate not in ("tree", "part"):
@@ -289,8 +300,11 @@ class Controller:
     def forces(self, pose: Pose) -> Forces:
         """Return the constraint forces of the control law at a pose, for the present state of the law.
 
-        The forces of user-defined terms are not included; `own_forces` returns them. Raises InvalidValue for a batch of poses.
+        The forces of user-defined terms are not included; `own_forces` returns them. Raises InvalidValue for a batch of poses, or a pose
+        of another robot.
         """
+        if getattr(pose, "robot", None) is not self.robot:
+            require_pose_of(self.robot, pose)
         return forces_of(self.law, pose, self.propagate, self._state)
 
     def own_forces(self, q: Array, dt: float, pose: Pose | None = None, reaching: Reaching = None) -> dict[str, Array]:
@@ -314,16 +328,22 @@ class Controller:
         `forces`: the constraint forces at q; None: computed from `pose`, the robot at q. Without a pose the model evaluates q, and contacts
         of the hands of the first two reaches with targets are ignored. Forces that depend on the law's state, and those of the user-defined
         terms, are computed if `forces` does not contain them. Forces of the client and of reaches are added. Raises InvalidValue for a dt
-        at which the law is unstable (`max_dt` or more), for a q that is not finite, and for forces that are not finite or whose sum is
-        above LARGEST_FORCE (1e9 rad/s^2).
+        at which the law is unstable (`max_dt` or more), for a q that is not finite, for forces that are not finite, of another shape or
+        whose sum is above LARGEST_FORCE (1e9 rad/s^2), and for a pose of another robot.
         """
-        if not 0 < dt < self.max_dt:
+        try:
+            is_stable = 0 < dt < self.max_dt
+        except TypeError:  # dt is no number
+            is_stable = False
+        if not is_stable:
             require_stable(self.robot, self.gains, dt)
         n = len(self._attractor)
         q = checked("q", q, n)
         if forces is None:
             pose = self._evaluated(q) if pose is None else pose
             forces = self.forces(pose)
+        else:
+            require_forces(forces, n)
         if not all(name in forces for name in self.force_names):
             forces = self._filled(forces, q, dt, pose)
         total = checked_force("forces", forces.total, n) + self.client_force(q)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+import reprlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, reduce
@@ -64,6 +65,9 @@ class Forces(Mapping[str, Array]):
 
     def __getitem__(self, name: str) -> Array:
         return self._rows[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._rows
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._rows)
@@ -155,6 +159,28 @@ def checked_force(what: str, value: Array, length: int) -> Array:
     if np.abs(array).max(initial=0.0) > LARGEST_FORCE:
         raise InvalidValue(f"{what}: {array[np.abs(array).argmax()]:.3g}; must be at most {LARGEST_FORCE:g} in size")
     return array
+
+
+def require_forces(given: Forces, length: int) -> None:
+    """Raise InvalidValue, with the name of the force, unless all given forces are arrays (length,) of finite numbers.
+
+    NumPy would spread a single number over all motors when forces are added.
+    """
+    rows = getattr(given, "_rows", None)
+    if rows is None:
+        raise InvalidValue(f"forces is {' '.join(reprlib.repr(given).split())}; it must be Forces, as controller.forces(pose), or None.")
+    shape = (length,)
+    for name, force in rows.items():
+        if type(force) is not np.ndarray or force.shape != shape:
+            checked(f"force {name!r}", force, length)
+
+
+def require_pose_of(robot: Robot, pose: object) -> None:
+    """Raise InvalidValue unless the pose is one of this robot, or of a robot with the same motors."""
+    other = getattr(pose, "robot", None)
+    if getattr(other, "motors", None) != robot.motors:
+        what = repr(pose) if other is None else f"of {other.name!r}"
+        raise InvalidValue(f"pose {what}: must be a pose of {robot.name!r}, as model.evaluate(q).")
 
 
 class State:

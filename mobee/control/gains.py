@@ -49,10 +49,11 @@ class Settle:
 
     def __post_init__(self) -> None:
         for name in ("speed", "acceleration", "interval", "timeout"):
-            if not 0 < getattr(self, name) < np.inf:
-                raise InvalidValue(f"settle {name} {getattr(self, name)}: must be finite and above 0")
-        if not 0 <= self.first_check < np.inf:
-            raise InvalidValue(f"settle first_check {self.first_check} s: must be a finite time, not negative")
+            value = getattr(self, name)
+            if not (isinstance(value, int | float | np.number) and 0 < value < np.inf):
+                raise InvalidValue(f"settle {name} {value!r}: must be finite and above 0")
+        if not (isinstance(self.first_check, int | float | np.number) and 0 <= self.first_check < np.inf):
+            raise InvalidValue(f"settle first_check {self.first_check!r} s: must be a finite time, not negative")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -225,8 +225,8 @@ def largest_step(robot: Robot, gains: Gains) -> float:
 
 def require_stable(robot: Robot, gains: Gains, dt: float) -> None:
     """Raise InvalidValue, with motor and violated bound, if the control law is unstable at steps of dt [s], or if dt is not valid."""
-    if not (dt > 0 and np.isfinite(dt)):
-        raise InvalidValue(f"time step {dt} s: must be a finite time above 0")
+    if not (isinstance(dt, int | float | np.number) and 0 < dt < np.inf):
+        raise InvalidValue(f"time step {dt!r} s: must be a finite time above 0")
     bound = stability_bound(robot, gains)
     if dt < bound.step:
         return

@@ -52,11 +52,13 @@ class ReflexSettings:
 
     def __post_init__(self) -> None:
         for name in ("confirm", "release", "brake", "dead_time"):
-            if not 0.0 <= getattr(self, name) < math.inf:
-                raise InvalidValue(f"reflex {name} {getattr(self, name)} s: must be a finite time, not negative")
+            value = getattr(self, name)
+            if not (isinstance(value, int | float | np.number) and 0.0 <= value < math.inf):
+                raise InvalidValue(f"reflex {name} {value!r} s: must be a finite time, not negative")
         for name in ("history", "pace"):
-            if not 0.0 < getattr(self, name) < math.inf:
-                raise InvalidValue(f"reflex {name} {getattr(self, name)}: must be finite and above 0")
+            value = getattr(self, name)
+            if not (isinstance(value, int | float | np.number) and 0.0 < value < math.inf):
+                raise InvalidValue(f"reflex {name} {value!r}: must be finite and above 0")
 
     @classmethod
     def naive(cls) -> ReflexSettings:

@@ -124,8 +124,8 @@ class Model:
         `skin`: m; the evaluator keeps a list of the pairs of volumes that are nearer than this. The engine "fcl" has no such list and
         evaluates every pair. Raises InvalidValue unless the skin is finite and above 0.
         """
-        if not 0.0 < skin < math.inf:
-            raise InvalidValue(f"skin {skin} m: must be a finite distance above 0")
+        if not (isinstance(skin, int | float | np.number) and 0.0 < skin < math.inf):
+            raise InvalidValue(f"skin {skin!r} m: must be a finite distance above 0")
         return Track(self, self._engine, skin)
 
     def jacobian(self, q: ArrayLike, marker: str) -> Array:

@@ -115,8 +115,8 @@ class OfflinePlant:
         alive, dt = living(model.robot, chosen.active), chosen.dt
         law = {name: getattr(chosen, name) for name in ("modality", "propagate", "speed_scale", "contact_forces", "terms")}
         self._controller = Controller(model, chosen.gains, alive=alive, **law)
-        if not 0 < dt < self.controller.max_dt:
-            raise InvalidValue(f"tick of {dt} s: the gains need more than 0 and less than {self.controller.max_dt:.4g} s")
+        if not (isinstance(dt, int | float | np.number) and 0 < dt < self.controller.max_dt):
+            raise InvalidValue(f"tick of {dt!r} s: the gains need more than 0 and less than {self.controller.max_dt:.4g} s")
         self.model, self.robot, self.dt = model, model.robot, dt
         parameters = chosen.motors if chosen.motors is not None else MotorParameters()
         self.motors = Motors(self.robot, parameters, seed, self.robot.home, alive)

@@ -28,7 +28,7 @@ def test_a_place_farther_than_anything_is_refused(far: float) -> None:
 
 
 def test_a_radius_a_normal_or_an_aim_that_is_none_is_refused() -> None:
-    for bad in ({"radius": 0.0}, {"radius": np.nan}, {"radius": 1e200}, {"normal": [0.0, 0.0, 0.0]}, {"aim": "middle"}):
+    for bad in ({"radius": 0.0}, {"radius": np.nan}, {"radius": "5 cm"}, {"radius": 1e200}, {"normal": [0.0, 0.0, 0.0]}, {"aim": "middle"}):
         with pytest.raises(MobeeError):
             ReachTarget(np.zeros(3), **bad)
 

@@ -221,6 +221,34 @@ def test_bad_input_is_refused() -> None:
         controller.push("tpi", np.zeros(3))
 
 
+@pytest.mark.parametrize(
+    "forces", [Forces(np.zeros(3), np.float64(1.0), np.zeros(3)), Forces(np.zeros(3), np.ones(1), np.zeros(3)), np.zeros(3)]
+)
+def test_forces_that_are_not_one_number_for_each_motor_are_refused(forces: Any) -> None:
+    controller = arm_controller()
+    with pytest.raises(InvalidValue, match="'constraints' of shape .*must be 3 finite numbers|must be Forces"):
+        controller.step(STRETCHED, DT, forces)
+    assert not controller.velocity.any()
+
+
+@pytest.mark.parametrize("pose", [Model(load_robot("katana")).evaluate(load_robot("katana").home), "home"], ids=["katana", "text"])
+def test_a_pose_of_another_robot_is_refused(pose: Any) -> None:
+    controller = arm_controller()
+    for use in (controller.forces, lambda given: controller.step(STRETCHED, DT, pose=given)):
+        with pytest.raises(InvalidValue, match=f"pose .*must be a pose of '{controller.robot.name}'"):
+            use(pose)
+    again = Model(two_part_arm()).evaluate(STRETCHED)  # of an equal robot
+    assert controller.step(STRETCHED, DT, pose=again).velocity.shape == (3,)
+
+
+@pytest.mark.parametrize("text", ["0.01", None])
+def test_text_or_none_for_a_number_is_refused(text: Any) -> None:
+    with pytest.raises(InvalidValue, match=f"time step {text!r} s"):
+        arm_controller().step(STRETCHED, text)
+    with pytest.raises(InvalidValue, match=f"speed_scale {text!r}"):
+        arm_controller(speed_scale=text)
+
+
 def test_a_misspelt_attribute_is_refused() -> None:
     with pytest.raises(AttributeError, match="atractor"):
         arm_controller().atractor = GOAL

@@ -135,7 +135,9 @@ def test_a_threshold_of_zero_is_refused() -> None:
         Settle(speed=0.0, acceleration=1.0)
 
 
-@pytest.mark.parametrize("change", [{"timeout": np.inf}, {"interval": np.nan}, {"first_check": np.nan}, {"first_check": -1.0}])
+@pytest.mark.parametrize(
+    "change", [{"timeout": np.inf}, {"interval": np.nan}, {"first_check": np.nan}, {"first_check": -1.0}, {"timeout": "3"}]
+)
 def test_times_that_would_never_end_an_action_are_refused(change: dict[str, float]) -> None:
     with pytest.raises(InvalidValue, match=f"settle {next(iter(change))}"):
         Settle(speed=0.02, acceleration=0.9, **change)

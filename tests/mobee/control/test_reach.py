@@ -107,8 +107,9 @@ def test_an_invalid_target_is_refused() -> None:
         reach_path(ARM, "tip", np.array([0.0, np.nan, 0.0]), BENT)
     with pytest.raises(InvalidValue, match="normal .*not be all 0"):
         reach_path(ARM, "tip", np.zeros(3), BENT, normal=np.zeros(3))
-    with pytest.raises(InvalidValue, match="tolerance -1"):
-        reach_path(ARM, "tip", np.zeros(3), BENT, tolerance=-1.0)
+    for tolerance, steps in ((-1.0, 10), ("small", 10), (1e-3, "all"), (1e-3, 0)):
+        with pytest.raises(InvalidValue, match=f"tolerance {tolerance!r} and {steps!r} steps"):
+            reach_path(ARM, "tip", np.zeros(3), BENT, tolerance=tolerance, steps=steps)
     for start in (np.stack([BENT, BENT]), BENT[:2], np.nan * BENT):
         with pytest.raises(InvalidValue, match="start.*finite numbers"):
             reach_path(ARM, "tip", np.zeros(3), start)

@@ -203,8 +203,9 @@ def test_an_invalid_reach_is_refused() -> None:
     controller = Controller(PLANAR)
     with pytest.raises(UnknownName, match="tip"):
         Reacher(controller, "tpi", np.zeros(3))
-    with pytest.raises(InvalidValue, match="tolerance"):
-        Reacher(controller, "tip", np.zeros(3), tolerance=0.0)
+    for tolerance in (0.0, "1 mm"):
+        with pytest.raises(InvalidValue, match=f"tolerance {tolerance!r} m"):
+            Reacher(controller, "tip", np.zeros(3), tolerance=tolerance)
     with pytest.raises(InvalidValue, match="the robot cannot reach with tip on link3: none of the motors"):
         Reacher(Controller(PLANAR, Gains.default().with_motors("*", weight=0)), "tip", np.zeros(3))
 

@@ -230,7 +230,9 @@ def test_a_pace_below_one_takes_longer() -> None:
     assert rewind(reflex) == [6, 3, 3, 2, 2, 1, 1, 0]
 
 
-@pytest.mark.parametrize("wrong", [{"confirm": -1.0}, {"dead_time": np.nan}, {"pace": 0.0}, {"history": np.inf}])
+@pytest.mark.parametrize(
+    "wrong", [{"confirm": -1.0}, {"dead_time": np.nan}, {"pace": 0.0}, {"history": np.inf}, {"brake": "on"}, {"pace": "1"}]
+)
 def test_settings_that_make_no_sense_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(InvalidValue, match=next(iter(wrong))):
         ReflexSettings(**wrong)

@@ -51,7 +51,7 @@ def test_too_stiff_is_refused_with_the_other_bound() -> None:
         require_stable(ARM, replace(Gains.default(), stiffness=1e5), 0.01)
 
 
-@pytest.mark.parametrize("dt", [0.0, -0.01, np.nan, np.inf])
+@pytest.mark.parametrize("dt", [0.0, -0.01, np.nan, np.inf, "0.01"])
 def test_a_step_that_is_no_time_is_refused(dt: float) -> None:
     with pytest.raises(InvalidValue, match="time step"):
         require_stable(ARM, Gains.default(), dt)

@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import gc
+from typing import Any
 
 import numpy as np
 import pytest
@@ -145,8 +146,8 @@ def test_objects_are_attached_where_a_tracked_pose_that_the_world_follows_has_br
     assert model.evaluate(moved).objects["tool"].position == pytest.approx(np.zeros(3), abs=1e-12)
 
 
-@pytest.mark.parametrize("skin", [0.0, -0.01, float("nan"), float("inf")])
-def test_a_skin_that_is_no_distance_is_refused(skin: float) -> None:
+@pytest.mark.parametrize("skin", [0.0, -0.01, float("nan"), float("inf"), "2 cm", None])
+def test_a_skin_that_is_no_distance_is_refused(skin: Any) -> None:
     with pytest.raises(InvalidValue, match="skin"):
         mobee.Model(loaded("katana")).track(skin=skin)
 

@@ -330,7 +330,18 @@ def test_substeps_cover_the_tick() -> None:
     assert [MotorParameters().substeps(dt) for dt in (0.001, 0.005, 0.01, 0.012, 0.02)] == [1, 1, 2, 3, 4]
 
 
-@pytest.mark.parametrize("change", [{"lag": -0.1}, {"lag": np.inf}, {"friction": (0.1, -0.1)}, {"encoder_noise": np.nan}, {"substep": 0.0}])
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"lag": -0.1},
+        {"lag": np.inf},
+        {"friction": (0.1, -0.1)},
+        {"encoder_noise": np.nan},
+        {"substep": 0.0},
+        {"lag": "a"},
+        {"substep": "a"},
+    ],
+)
 def test_nonsense_parameters_are_refused_by_name(change: dict[str, Any]) -> None:
     with pytest.raises(InvalidValue, match=next(iter(change))):
         MotorParameters(**change)

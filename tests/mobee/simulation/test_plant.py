@@ -170,8 +170,9 @@ def test_bad_input_is_refused() -> None:
         plant.measure("trunc")
     with pytest.raises(InvalidValue, match="motors is 'identified'; it must be MotorParameters"):
         arm_plant(motors="identified")
-    with pytest.raises(InvalidValue, match="tick"):
-        arm_plant(gains=Gains.published_2014(), dt=0.04)
+    for dt in (0.04, "0.01"):
+        with pytest.raises(InvalidValue, match="tick"):
+            arm_plant(gains=Gains.published_2014(), dt=dt)
 
 
 @pytest.mark.parametrize("target", [["a"] * 6, [1j] * 6, [1.0] * 4, [np.nan] * 6, [99] * 6, [[0.0] * 6]])
