@@ -51,8 +51,12 @@ def check_robot(robot: Robot, world: World | None = None) -> list[Finding]:
     """Return all findings about a robot, errors first.
 
     `world`: a world; the objects that the robot touches in it at home are reported too. Poses are sampled with a fixed seed, so that the
-    same robot always gets the same findings.
+    same robot always gets the same findings. Raises InvalidValue if `robot` or `world` has another type.
     """
+    if not isinstance(robot, Robot):
+        raise InvalidValue(f"robot is {robot!r}; it must be a Robot, as load_robot returns it.")
+    if not isinstance(world, World | None):
+        raise InvalidValue(f"world is {world!r}; it must be a World, as load_world returns it, or None.")
     subject = Subject(robot, world)
     with np.errstate(invalid="ignore"):  # joints without limits are a finding, not a failure of the others
         found = [finding for check in CHECKS for finding in check(subject)]
@@ -237,10 +241,13 @@ def check_file(
 def _require_known(name_or_path: str | Path) -> None:
     """Raise RobotFileError if the argument is the path of a folder, and UnknownName if it is a name that no robot and no world has.
 
+    Raises InvalidValue if it is neither text nor a path.
     An argument without a folder and without a suffix (such as .xml) counts as a name.
     """
-    given, path = str(name_or_path), Path(name_or_path)
     known = {*shipped_robots(), *shipped_worlds()}
+    if not isinstance(name_or_path, str | Path):
+        raise InvalidValue(f"name_or_path is {name_or_path!r}; it must be a path, or a name: {', '.join(sorted(known))}.")
+    given, path = str(name_or_path), Path(name_or_path)
     if given in known:
         return
     if is_folder(path):

@@ -93,10 +93,15 @@ def derive(robot: Robot, parts: Mapping[str, Sequence[str]] | None = None, seed:
 
     Raises:
         InvalidValue: no motor moves the end of a chain; a part in `parts` is given no motors, or motors of another part; or `parts` names a
-            motor twice; or the seed is no whole number of at least 0.
+            motor twice; or the seed is no whole number of at least 0; or an argument has another type.
         UnknownName: `parts` names a motor that the robot does not have.
     """
     checked_seed(seed)
+    if not isinstance(robot, Robot):
+        raise InvalidValue(f"robot is {robot!r}; it must be a Robot, as load_robot returns it.")
+    lists = parts.values() if isinstance(parts, Mapping) else [] if parts is None else [None]
+    if not all(isinstance(motors, Sequence) and not isinstance(motors, str) for motors in lists):
+        raise InvalidValue(f'parts is {parts!r}; it must be a dict from parts to lists of motors, such as {{"arm": ["pan", "bend"]}}.')
     robot, limited = bounded(robot)
     if parts:
         robot, arms = _requested(robot, parts)

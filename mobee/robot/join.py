@@ -51,9 +51,18 @@ def join_robots(
     are in the order given. The bases become one link, with the name of the first base. Every solid is tested against all solids of the
     other robots, every field (volume that causes a repulsive force) against all their fields; within a robot its own pairs are kept. The
     joined robot has the largest `Robot.least_lever` of all robots. This number scales the forces of fields: robots with a smaller value get
-    other forces from contacts than before. Raises InvalidValue for equal names, for no robots and for a place that is not a pose;
-    UnknownName for a place without a robot.
+    other forces from contacts than before. Raises InvalidValue for equal names, for no robots, for an argument of a wrong type and for a
+    place that is not a pose; UnknownName for a place without a robot.
     """
+    if not isinstance(robots, Mapping):
+        raise InvalidValue(f'robots is a {type(robots).__name__}; it must be a dict, such as {{"left": one, "right": other}}.')
+    for key, robot in robots.items():
+        if not isinstance(key, str):
+            raise InvalidValue(f'robots has the key {key!r}; a key must be text, which the names begin with, such as "left".')
+        if not isinstance(robot, Robot):
+            raise InvalidValue(f"robot {key!r} is {robot!r}; it must be a Robot, as load_robot returns it.")
+    if not isinstance(name, str | None):
+        raise InvalidValue(f"name is {name!r}; it must be text, or None.")
     for key in places or {}:
         if key not in robots:
             raise UnknownName("robot", key, robots)

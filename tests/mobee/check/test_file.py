@@ -2,11 +2,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from mobee.check import check_file
-from mobee.errors import RobotFileError, UnknownName
+from mobee.check import check_file, check_robot
+from mobee.errors import InvalidValue, RobotFileError, UnknownName
 from mobee.model import World
 from mobee.robot.robot import Robot
 from tests.mobee.check.arm import ARM
@@ -38,6 +39,20 @@ def test_a_file_that_cannot_be_read_raises_the_readers_error(tmp_path: Path) -> 
         check_file(robot_file(tmp_path, "<bodypart/>"))
     with pytest.raises(UnknownName, match="icub"):
         check_file("icubb")
+
+
+@pytest.mark.parametrize("given", [None, 3, b"katana"])
+def test_what_is_no_path_is_refused(given: Any) -> None:
+    with pytest.raises(InvalidValue, match=f"name_or_path is {given!r}; it must be a path, or a name: cup, icub"):
+        check_file(given)
+
+
+def test_robots_and_worlds_of_a_wrong_type_are_refused() -> None:
+    name: Any = "table"
+    with pytest.raises(InvalidValue, match="robot is 'table'; it must be a Robot"):
+        check_robot(name)
+    with pytest.raises(InvalidValue, match="world is 'table'; it must be a World"):
+        check_file("katana", name)
 
 
 def test_a_misspelt_world_is_answered_with_the_nearest() -> None:

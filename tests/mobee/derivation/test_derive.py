@@ -165,6 +165,18 @@ def test_a_seed_that_is_no_whole_number_of_at_least_0_is_refused(tmp_path: Path)
             derive(robot, seed=seed)
 
 
+@pytest.mark.parametrize("robot", ["katana", None])
+def test_what_is_no_robot_is_refused(robot: Any) -> None:
+    with pytest.raises(InvalidValue, match=f"robot is {robot!r}; it must be a Robot, as load_robot returns it"):
+        derive(robot)
+
+
+@pytest.mark.parametrize("parts", [["arm_0"], {"arm": "arm_0"}, {"arm": 3}])
+def test_parts_that_are_no_dict_of_lists_are_refused(parts: Any) -> None:
+    with pytest.raises(InvalidValue, match="it must be a dict from parts to lists of motors"):
+        derive(load_robot("katana"), parts)
+
+
 def test_requested_joints_make_the_part(tmp_path: Path) -> None:
     robot = urdf(tmp_path, limb("left_shoulder", 0.0, 0.3, 0.2), limb("right_shoulder", 0.0, -0.3, 0.2))
     derived = derive(robot, {"mine": ("left_shoulder_joint2", "left_shoulder_joint0")})

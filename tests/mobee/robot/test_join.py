@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -95,6 +96,20 @@ def test_equal_names_are_refused() -> None:
     inner = join_robots({"b": KATANA})
     with pytest.raises(InvalidValue, match="two parts of the joined robots have the name 'a_b_arm'"):
         join_robots({"a": inner, "a_b": KATANA})
+
+
+@pytest.mark.parametrize(
+    ("robots", "problem"),
+    [
+        ([KATANA, KATANA], "robots is a list; it must be a dict"),
+        (KATANA, "robots is a Robot; it must be a dict"),
+        ({1: KATANA}, "robots has the key 1; a key must be text"),
+        ({"a": "katana"}, "robot 'a' is 'katana'; it must be a Robot"),
+    ],
+)
+def test_robots_of_a_wrong_type_are_refused(robots: Any, problem: str) -> None:
+    with pytest.raises(InvalidValue, match=problem):
+        join_robots(robots)
 
 
 def test_a_place_without_a_robot_or_without_a_pose_is_refused() -> None:
