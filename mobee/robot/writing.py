@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -42,12 +43,16 @@ def drives_of(robot: Robot) -> tuple[Drive, ...]:
 def write_whole(path: Path, content: bytes) -> Path:
     """Write a file completely or not at all, and return its path.
 
-    The content is written into a temporary file in the same folder, which then replaces the file. Raises OSError with the name of `path`.
+    The content is written into a temporary file in the same folder, which then replaces the file and has its mode. A symbolic link stays
+    one: its target is replaced. Raises OSError with the name of `path`.
     """
-    beside = path.with_name(f".{path.name}.{os.getpid()}")
+    target = Path(os.path.realpath(path))
+    beside = target.with_name(f".{target.name}.{os.getpid()}")
     try:
         beside.write_bytes(content)
-        os.replace(beside, path)
+        if target.exists():
+            shutil.copymode(target, beside)
+        os.replace(beside, target)
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(path)) from error
     finally:
