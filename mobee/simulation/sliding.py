@@ -39,7 +39,8 @@ class SlidingObject:
     rotate. It topples if it is pushed higher than radius / friction above the surface, pressed from above, or wedged between solids; it
     falls if its centre leaves the area. A fallen object is removed from the world for one second, and is then put back to its first place
     as soon as no solid of the robot is in this place, or within 3 cm of its side; after a restart of the plant, without the wait. It exerts
-    no force on the robot, and other objects do not stop it. `World.move` moves it to another place.
+    no force on the robot, and other objects do not stop it. `World.move` moves it to another place. While it is attached to a link, it
+    moves with the link and is not pushed.
 
     Args:
         plant: the plant whose motion pushes the object; its callback (`every`) is used for this.
@@ -84,25 +85,33 @@ class SlidingObject:
 
     @property
     def place(self) -> Array | None:
-        """The position of the object's centre, (3,) m, root frame; None after a fall, until the object is put back."""
-        return None if self._place is None else self._place.copy()
+        """The position of the object's centre, (3,) m, root frame; None while it is not in the world.
+
+        It is not in the world after a fall, until it is put back, and after the caller has removed it.
+        """
+        model = self._plant.model
+        thing = model.world.objects.get(self.name)
+        if thing is not None and thing.link is not None:
+            thing = model.evaluate(self._plant.motors.q).objects[self.name]
+        return None if thing is None else thing.position.copy()
 
     def perceive(self) -> dict[str, Array]:
-        """Return the exact position of the object (3,) m, root frame, by its name; an empty dict after a fall, until it is put back.
+        """Return the exact position of the object (3,) m, root frame, by its name; an empty dict while it is not in the world (`place`).
 
         Give this method to a `PerceivingPlant` as the argument `perceive`.
         """
-        return {} if self._place is None else {self.name: self._place.copy()}
+        place = self.place
+        return {} if place is None else {self.name: place}
 
     def put_back(self) -> bool:
         """Put the object to its first place, also if it has not fallen or was removed from the world; return whether this was possible.
 
-        If a solid of the robot is in this place, or within 3 cm of its side, nothing changes and False is returned.
+        If a solid of the robot is in this place, or within 3 cm of its side, nothing changes and False is returned. Raises InvalidValue if
+        the object is attached to a link.
         """
         if self._deepest(self._plant.motors.q.tobytes(), self._room) is not None:
             return False
         first, world = self._first, self._plant.model.world
-        self._alone.move(self.name, position=first.position)
         if self.name not in world.objects:  # fallen, or the caller has removed it
             shape = Geometry(first.kind, first.size)
             world.add(
@@ -111,6 +120,7 @@ class SlidingObject:
             )  # fmt: skip
         else:
             world.move(self.name, position=first.position)
+        self._alone.move(self.name, position=first.position)
         self._place = first.position.copy()
         return True
 
@@ -125,8 +135,8 @@ class SlidingObject:
                 self.put_back()
             return
         thing = self._plant.model.world.objects.get(self.name)
-        if thing is None:
-            return  # the caller has removed it
+        if thing is None or thing.link is not None:
+            return  # the caller has removed it, or attached it to a link
         there = thing.position
         if (there != self._place).any():  # the caller has moved it
             self._place = there.copy()

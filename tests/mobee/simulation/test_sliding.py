@@ -167,6 +167,35 @@ def test_it_stays_where_the_caller_moves_it() -> None:
     assert "cup" not in plant.model.world.objects
 
 
+def test_an_object_that_the_caller_has_removed_is_not_perceived() -> None:
+    plant, cup = stage()
+    plant.model.world.remove("cup")
+    assert cup.place is None and cup.perceive() == {}
+    plant.run(10)
+    assert cup.place is None and cup.falls == 0
+    plant.model.world.add("cup", cylinder(CUP, HEIGHT), position=(0.75, -0.5, TOP + HEIGHT / 2), role="ghost")
+    assert cup.perceive()["cup"].tolist() == [0.75, -0.5, TOP + HEIGHT / 2]
+
+
+def test_an_attached_object_is_perceived_where_its_link_holds_it_and_is_not_pushed() -> None:
+    plant, cup = stage()
+    world, link = plant.model.world, plant.robot.links[-1]
+    plant.model.attach("cup", link, plant.motors.q)
+    assert cup.place == pytest.approx([*BESIDE, TOP + HEIGHT / 2])
+    plant.act("trunk", np.array([-0.4]))
+    held = plant.model.evaluate(plant.motors.q).objects["cup"].position
+    assert cup.perceive()["cup"] == pytest.approx(held) and np.linalg.norm(held[:2] - BESIDE) > 0.1
+    assert (cup.falls, cup.path) == (0, 0.0)
+    plant.act("trunk", np.array([0.4]))
+    with pytest.raises(InvalidValue, match="detach it first"):
+        cup.put_back()
+    plant.follow()
+    world.detach("cup")
+    here = cup.place
+    plant.run(10)
+    assert np.array_equal(cup.place, here)
+
+
 def test_the_top_of_a_turned_support_is_turned() -> None:
     plant, _ = stage()
     half = np.sqrt(0.5)
