@@ -330,18 +330,24 @@ class BusPlant:
         """Call the controller to start an action of a part, and return the sent action.
 
         `verb`: last word of the call's key. `fields`: data of the request. Raises InvalidValue if the controller refuses the target because
-        of the limits or the reach, ActionInterrupted if the call fails for another reason.
+        of the limits or the reach, ActionInterrupted if the call fails for another reason. While the robot is paused, a reach waits.
         """
-        key, controllers = keys.goal(part, verb), self._controllers()
-        try:
-            reply = self._service.call(key, request, Started, tries=TRIES, epoch=self._epochs[part], action_id=action_id, **fields)
-        except CallFailed as error:
-            if error.code in ("limits", "reach"):
-                raise InvalidValue(str(error)) from None
-            if error.code == "epoch":
-                del self._epochs[part]
-            raise ActionInterrupted(f"{part}: {error}") from None
-        return Sent(action_id, controllers, reply.k, reply.k)
+        key = keys.goal(part, verb)
+        while True:
+            controllers = self._controllers()
+            try:
+                reply = self._service.call(key, request, Started, tries=TRIES, epoch=self._epochs[part], action_id=action_id, **fields)
+            except CallFailed as error:
+                if error.code == "paused":
+                    self.pause(RETRY_PERIOD)
+                    self.measure(part)  # after the pause the part is in hold for a moment
+                    continue
+                if error.code in ("limits", "reach"):
+                    raise InvalidValue(str(error)) from None
+                if error.code == "epoch":
+                    del self._epochs[part]
+                raise ActionInterrupted(f"{part}: {error}") from None
+            return Sent(action_id, controllers, reply.k, reply.k)
 
     def _controllers(self) -> frozenset[str]:
         return frozenset(self._service.alive.get("controller", ()))

@@ -52,6 +52,8 @@ class GoalServer:
         self._service, self._robot, self._law, self._actions = service, robot, law, actions
         self._reaches, self._commands = reaches, commands
         self._epoch = time.time_ns() // 1_000_000  # newer than any epoch of an earlier controller
+        self.paused_at: int | None = None
+        """Tick at which the robot was paused, until the first step after the pause; None: it is not paused."""
         service.on_request(keys.goal("*", "take"), Take, _by_part(self._take), part_of_key=True)
         service.on_request(keys.goal("*", "release"), WithEpoch, _by_part(self._release), part_of_key=True)
         service.on_request(keys.goal("*", "goal"), Goal, _by_part(self._goal), part_of_key=True)
@@ -92,6 +94,7 @@ class GoalServer:
     def _reach(self, part: str, request: ReachFor) -> Started:
         self._check_epoch(part, request.epoch)
         self._check_free(part)
+        self._check_running()
         try:
             self._reaches.begin(part, request)
         except MobeeError as error:
@@ -123,8 +126,10 @@ class GoalServer:
 
     def _force(self, part: str, request: Force) -> Done:
         self._check_epoch(part, request.epoch)
-        if self._actions[part].is_in_hold and (request.f is not None or request.marker is not None):
-            raise CallRefused("held", f"{part} is in hold, and takes no force: wait until the status of its motion is not 'held'")
+        if request.f is not None or request.marker is not None:
+            if self._actions[part].is_in_hold:
+                raise CallRefused("held", f"{part} is in hold, and takes no force: wait until the status of its motion is not 'held'")
+            self._check_running()
         try:
             self._apply(part, request)
         except MobeeError as error:
@@ -151,6 +156,11 @@ class GoalServer:
     def _check_free(self, part: str) -> None:
         if self._actions[part].is_in_hold:
             raise CallRefused("held", f"{part} is in hold: wait until the status of its motion is not 'held'")
+
+    def _check_running(self) -> None:
+        """Refuse a reach or a force in a pause: the hold after the pause would end it. A goal would be suspended, and continue."""
+        if self.paused_at is not None:
+            raise CallRefused("paused", "the robot is paused, and begins no reach and takes no force: resume it first")
 
     def _check_epoch(self, part: str, epoch: int) -> None:
         owner = self._actions[part].owner

@@ -61,6 +61,7 @@ class ControllerNode:
 
     def _begin(self, tick: Tick) -> None:
         if tick.mode == "paused":
+            self._goals.paused_at = tick.k
             return
         if tick.dt / 1e9 >= self._law.max_dt:
             limit = 1e3 * self._law.max_dt
@@ -110,6 +111,8 @@ class ControllerNode:
         fresh = self._law.forces.are_fresh(tick.k)
         is_stopped = self._drives.watch_stop(tick.parts)
         self._supervise(tick, fresh, is_stopped)
+        if self._goals.paused_at is not None and tick.k > self._goals.paused_at:  # the parts are in hold now
+            self._goals.paused_at = None
         orders, reference = self._control(tick, fresh, is_stopped) if tick.k > 0 else ({}, self._law.q)
         if tick.mode == "lock":
             self._motions.publish(tick)  # first: a service that gets its turn must know the state of its action
@@ -200,7 +203,7 @@ class ControllerNode:
         for part in self._robot.parts:
             self._service.ask(keys.meta(part), PartMeta, self._note_meta)
         self._drives.forget()
-        self._tick = None
+        self._tick = self._goals.paused_at = None
         self._commands.begin_tick()
         self._law.reset()
         for part, action in self._actions.items():

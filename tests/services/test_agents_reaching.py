@@ -36,6 +36,7 @@ class FakeReaches(FakeController):
         self.removed: list[str] = []
         self.refusals: list[float] = []  # of targets, monotonic clock
         self.refuses = 0  # how many targets are refused because another service presents one
+        self.pauses = 0  # how many reaches are refused because the robot is paused
         self._reach = rig.bus.publisher(Reach, part)
         rig.serve(keys.goal("*", "reach"), ReachFor, self._asked)
         rig.serve(keys.world_rpc("add"), AddObject, self._added)
@@ -58,6 +59,9 @@ class FakeReaches(FakeController):
         with self._lock:
             if request.epoch != self.epoch:
                 raise Refusal("epoch")
+            if self.pauses:
+                self.pauses -= 1
+                raise Refusal("paused")
             self.reaches.append(request)
             self.action_id, self._target, self.start_k = request.action_id, self.q, self.rig.bus.k
             self._become("moving")
@@ -149,6 +153,15 @@ def test_an_agent_waits_while_another_service_presents_a_target(stage: tuple[Rig
     assert len(controller.presented) == 1
     first, *later = controller.refusals
     assert later[-1] - first > 1.5  # two waits
+
+
+def test_a_reach_waits_for_the_end_of_a_pause(stage: tuple[Rig, FakeReaches]) -> None:
+    made, controller = stage
+    controller.pauses = 2
+    events = made.record(Event, "agent_right_arm")
+    assert agent(made, "--tries", "1").wait(30.0) == 0
+    assert (controller.pauses, len(controller.reaches)) == (0, 1)
+    assert not [event for event in events if event.code == "interrupted"]
 
 
 def test_an_agent_that_rests_leaves_the_target_to_others_and_presents_its_own_afterwards(stage: tuple[Rig, FakeReaches]) -> None:

@@ -13,7 +13,8 @@ from bus_schema.messages import Event, Follow, Reach, Targets
 from bus_schema.rpc import ReachFor, Started
 from mobee import Model
 from mobee.arrays import Array
-from tests.services.controller.stage import ROBOT, SETTLE, Stage, near, refused
+from services.common.rpc import CallFailed
+from tests.services.controller.stage import PARTS, ROBOT, SETTLE, Stage, near, refused
 from tests.services.harness import wait_for
 
 MODEL = Model(ROBOT)
@@ -64,6 +65,29 @@ def test_a_reach_is_drawn_to_its_target_and_back_and_settles_twice(run: Stage, r
     assert np.abs(np.array(motion.q) - before).max() < 0.3 * drawn
     np.testing.assert_allclose(motion.goal, before, atol=1e-15)  # the attractor has not moved
     assert (reports[-1].q, reports[-1].position) == (end.q, end.position)
+
+
+def test_in_a_pause_a_goal_waits_and_reaches_and_forces_are_refused(run: Stage, reports: list[Reach]) -> None:
+    (_, left), (_, right) = run.own("left_arm"), run.own("right_arm", "agent_right_arm")
+    for part in PARTS:
+        run.sim.hold(part)
+    run.sim.tick(mode="paused")
+    wait_for(lambda: is_paused(run, left), "the pause")
+    assert "resume it" in refused("paused", lambda: reach(run, right, palm(run.sim.q)))
+    run.force("left_arm", left)  # clearing is always right
+    run.goal("left_arm", left, near("left_arm"), "later")
+    run.play(lambda: run.motion("left_arm").status == "moving" and run.motion("right_arm").status == "idle", "the end of the hold")
+    assert run.motion("left_arm").action_id == "later"
+    reach(run, right, palm(run.sim.q) + [-0.03, 0.02, 0.05])
+    run.play(lambda: phase(reports) == "returning", "the force's end")
+
+
+def is_paused(stage: Stage, epoch: int) -> bool:
+    try:
+        stage.force("left_arm", epoch, f=[0.0] * 16)
+    except CallFailed as refusal:
+        return refusal.code == "paused"
+    return False
 
 
 def test_a_reach_that_is_to_stay_ends_where_its_force_does(run: Stage, reports: list[Reach]) -> None:
