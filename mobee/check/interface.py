@@ -65,10 +65,12 @@ class Subject:
         """
         return self.robot.where.get((kind, name)) or self.robot.where.get(("robot", self.robot.name)) or self.robot.name
 
-    @property
-    def is_urdf(self) -> bool:
-        """Whether the robot was read from a URDF file; the remedies for some findings are different then."""
-        return any(".urdf:" in line.lower() for line in self.robot.where.values())
+    def is_urdf(self, kind: str, name: str) -> bool:
+        """Return whether an element was read from a URDF file; the remedies for some findings are different then.
+
+        `kind`, `name`: as for `where`. A robot can be joined from URDF and other files.
+        """
+        return self.where(kind, name).rpartition(":")[0].lower().endswith(".urdf")
 
     @cached_property
     def is_mjcf(self) -> bool:

@@ -136,17 +136,17 @@ def idle_parts(subject: Subject) -> Iterator[Finding]:
 def unreachable_markers(subject: Subject) -> Iterator[Finding]:
     """Yield a finding for each marker that no motor moves; for a URDF or MJCF file, in which many links are markers, one note for all."""
     unmoved = [marker for marker in subject.robot.markers.values() if marker.link not in subject.moved]
-    if (subject.is_urdf or subject.is_mjcf) and unmoved:
+    frames = [marker for marker in unmoved if subject.is_mjcf or subject.is_urdf("marker", marker.name)]
+    if frames:
         yield Finding(
             "note",
             "marker",
-            subject.where("marker", unmoved[0].name),
-            f"{count(unmoved, 'marker')} that no motor moves: {some(marker.name for marker in unmoved)}",
+            subject.where("marker", frames[0].name),
+            f"{count(frames, 'marker')} that no motor moves: {some(marker.name for marker in frames)}",
             "their Jacobian is zero: they can neither reach nor be pushed",
             "nothing, if they are frames of the base",
         )
-        return
-    for marker in unmoved:
+    for marker in (marker for marker in unmoved if marker not in frames):
         yield Finding(
             "warning",
             "marker",
@@ -217,7 +217,7 @@ def _change(subject: Subject, motor: Motor, home: float) -> str:
     line = _line(subject, motor).rpartition(":")[2]
     if subject.is_mjcf:
         return f"{motor.name} {home:.6g} in the qpos of a keyframe home"
-    if not subject.is_urdf:
+    if not subject.is_urdf("motor", motor.name):
         value = home if in_metres(subject.robot, motor) else np.rad2deg(home)
         return f'{motor.name} home="{value:.6g}" (line {line})'
     index, scale, offset = motor.joints[0]

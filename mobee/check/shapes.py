@@ -99,7 +99,7 @@ def fields(subject: Subject) -> Iterator[Finding]:
             "the robot has no field",
             "no force acts before its solids touch: the controller cannot keep it away from itself or from the world",
             "`mobee convert IN OUT.xml --field 0.03` gives every solid a field that reaches 3 cm farther; keep those that you want"
-            if subject.is_urdf or subject.is_mjcf
+            if subject.is_urdf("robot", subject.robot.name) or subject.is_mjcf
             else 'give each link that should keep its distance a field: field=".06" at a link, or a shape with field="true"',
         )
         return

@@ -56,10 +56,8 @@ def size(subject: Subject) -> Iterator[Finding]:
 
 
 def radians(subject: Subject) -> Iterator[Finding]:
-    """Yield a finding if ranges of motors are probably radians that were read as degrees; not for a URDF, which is in radians."""
-    if subject.is_urdf:
-        return
-    turning = [motor for motor in subject.robot.motor_table if _turns(subject, motor)]
+    """Yield a finding if ranges of motors are probably radians that were read as degrees; not for those of a URDF, which is in radians."""
+    turning = [motor for motor in subject.robot.motor_table if _turns(subject, motor) and not subject.is_urdf("motor", motor.name)]
     suspects = [motor for motor in turning if _is_quarter(motor)]
     if turning and all(np.abs(motor.limits).max() <= TURN_AS_DEGREES for motor in turning):
         suspects = turning
@@ -146,13 +144,14 @@ def _without(subject: Subject) -> Iterator[Finding]:
     solid = {shape.link for shape in robot.shapes if shape.role == "solid"}
     idle = sorted((solid & subject.moved) - {body.link for body in robot.bodies})
     if idle:
+        tag = "<inertial>" if subject.is_urdf("link", robot.links[idle[0]]) else "<mass>"
         yield Finding(
             "note",
             "mass",
             subject.where("link", robot.links[idle[0]]),
             f"{count(idle, 'moving link')} with solids and without a mass: {some(robot.links[link] for link in idle)}",
             "gravity compensation ignores their weight",
-            f"nothing, if the mass of the link that carries them includes theirs; else add {'<inertial>' if subject.is_urdf else '<mass>'}",
+            f"nothing, if the mass of the link that carries them includes theirs; else add {tag}",
         )
 
 

@@ -188,13 +188,14 @@ def always_touching(subject: Subject) -> Iterator[Finding]:
 
 def _written(subject: Subject) -> str:
     """Return a hint that names the option which writes these <disable_collisions> lines; for a URDF only."""
-    return " (--write-srdf writes it)" if subject.is_urdf else ""
+    return " (--write-srdf writes it)" if subject.is_urdf("robot", subject.robot.name) else ""
 
 
 def _ignoring(subject: Subject, first: str, second: str) -> str:
     """Return the line of XML that excludes the pair of links of two shapes."""
     link1, link2 = subject.urdf_link(first), subject.urdf_link(second)
-    if link1 and link2:
+    file1, file2 = (subject.where("shape", shape).rpartition(":")[0] for shape in (first, second))
+    if link1 and link2 and file1 == file2:
         return f'<disable_collisions link1="{link1}" link2="{link2}" reason="Default"/> in the SRDF beside it'
     links = {shape.name: subject.robot.links[shape.link] for shape in subject.robot.shapes}
     if subject.is_mjcf:
@@ -261,7 +262,7 @@ def _parting(subject: Subject, contact: Contact) -> str:
         remedy = 'write a <key name="home" qpos="..."/> without contact, or correct a shape'
         apart = "" if contact.second_link < 0 else f"; where only hulls overlap: {_ignoring(subject, contact.first, contact.second)}"
         return remedy + apart
-    if not subject.is_urdf:
+    if not subject.is_urdf("shape", contact.first):
         return "move the home, make a shape smaller, or correct where one is placed"
     remedy = 'choose a home: <group_state name="home"> in the SRDF beside it (else 0, or the nearest limit), or correct a shape'
     if contact.second_link < 0:

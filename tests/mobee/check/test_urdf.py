@@ -10,6 +10,8 @@ import pytest
 from mobee.check import Finding, check_file
 from mobee.errors import InvalidValue
 from mobee.robot.robot import Robot
+from tests.mobee.check.arm import ARM
+from tests.mobee.robot.robot_files import robot_file
 
 URDF = """\
 <robot name="toy">
@@ -67,6 +69,29 @@ def test_frames_of_the_base_are_a_note(file: Path) -> None:
 def test_small_ranges_are_no_slip_for_a_urdf_is_read_in_radians(file: Path) -> None:
     file.write_text(URDF.format("").replace('"-90" upper="90"', '"-0.1" upper="0.1"').replace('"-2" upper="2"', '"-0.05" upper="0.05"'))
     assert of(file, "unit") == []
+
+
+def test_a_robot_joined_from_a_urdf_and_xml_has_the_remedies_of_each_file(file: Path) -> None:
+    plate = '<link name="plate"/><joint name="bolt" type="fixed"><parent link="base"/><child link="plate"/></joint>'
+    file.write_text(URDF.format(plate).replace('"-90" upper="90"', '"-0.1" upper="0.1"'))
+    arm = ARM.replace('"arm">', '"arm"><marker name="foot"/>').replace('"-90" maxPos="90" home="0"', '"-1.57" maxPos="1.57" home="1.57"')
+    mixed = robot_file(file.parent, '<robot name="u" file="toy.urdf" px="2"/>', *arm.splitlines())
+    found = [(finding.severity, finding.check, finding.where) for finding in check_file(mixed).findings]
+    assert [one for one in found if one[1] in ("marker", "unit")] == [
+        ("warning", "unit", f"{mixed}:5"),
+        ("warning", "marker", f"{mixed}:3"),
+        ("note", "marker", f"{file}:9"),
+    ]
+    (finding,) = of(mixed, "home-zone")
+    assert 'pan home="0.785" (line 5)' in finding.remedy
+
+
+def test_a_pair_of_two_urdfs_is_left_out_in_the_file_that_joins_them(file: Path) -> None:
+    file.write_text(URDF.format(""))
+    file.with_name("other.urdf").write_text(URDF.format(""))
+    joined = robot_file(file.parent, '<robot name="a" file="toy.urdf"/>', '<robot name="b" file="other.urdf"/>')
+    (finding,) = [finding for finding in of(joined, "always-touching") if "'a_fore' and 'b_fore'" in finding.what]
+    assert finding.remedy == 'make one smaller, or leave the pair out: <ignore first="a_fore" second="b_fore"/>'
 
 
 def test_a_collision_at_home_may_be_left_out_in_the_srdf(file: Path) -> None:
