@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mobee.arrays import Array
 from mobee.errors import InvalidValue
@@ -113,17 +114,29 @@ class Lens:
                 found -= step
                 if not np.nanmax(np.abs(step), initial=0.0) > ENOUGH:
                     break
-            slope = self.distortion_slope(found)
-            shown = (slope[..., 0, 0] > 0.0) & (slope[..., 0, 0] * slope[..., 1, 1] > slope[..., 0, 1] ** 2)  # else the lens folds back
-            wrong = ~((np.abs(step).max(axis=-1) <= 1e-6) & shown)
+            wrong = ~((np.abs(step).max(axis=-1) <= 1e-6) & self._shows(found))
         found[wrong] = np.nan
         return found
 
     def project(self, points: Array) -> Array:
-        """Return the pixels (..., 2), column and row, of points (..., 3) m in the camera's frame; NaN for points behind the camera."""
-        ahead = np.where(points[..., 2:] > 0.0, points[..., 2:], np.nan)
-        found: Array = self.distort(points[..., :2] / ahead) * (self.fx, self.fy) + (self.cx, self.cy)
+        """Return the pixels (..., 2), column and row, of points (..., 3) m in the camera's frame.
+
+        NaN for points behind the camera, and for those so far from its axis that the distortion would fold them back into the picture.
+        """
+        flat = points[..., :2] / np.where(points[..., 2:] > 0.0, points[..., 2:], np.nan)
+        found: Array = self.distort(flat) * (self.fx, self.fy) + (self.cx, self.cy)
+        if self.distortion:
+            found[~self._shows(flat)] = np.nan
         return found
+
+    def _shows(self, flat: Array) -> NDArray[np.bool_]:
+        """Return whether points `flat` (..., 2), (x / z, y / z), are nearer to the axis than where the distortion first folds back."""
+        slope = self.distortion_slope(flat)
+        rising = (slope[..., 0, 0] > 0.0) & (slope[..., 0, 0] * slope[..., 1, 1] > slope[..., 0, 1] ** 2)
+        root = 9.0 * self.k1**2 - 20.0 * self.k2  # the radius r (1 + k1 r^2 + k2 r^4) has its first maximum where 2 / r^2 is `fold`
+        fold = -3.0 * self.k1 + np.sqrt(root) if root >= 0.0 else 0.0
+        shown: NDArray[np.bool_] = rising & ((flat**2).sum(axis=-1) * max(fold, 0.0) < 2.0)
+        return shown
 
     def projection_slope(self, points: Array) -> Array:
         """Return the derivative (..., 2, 3) [px/m] of `project` at points (..., 3) m in the camera's frame, z > 0."""

@@ -48,6 +48,29 @@ def test_a_direction_that_the_lens_does_not_show_has_no_ray_and_no_pixel() -> No
     assert np.isnan(DRAGONFLY.project(np.array([0.0, 0.0, -1.0]))).all()
 
 
+@pytest.mark.parametrize(
+    ("k1", "k2", "fold"),
+    [(-0.4, 0.0, 1.0 / np.sqrt(1.2)), (-0.5, 0.1, 1.0), (-0.1, -0.05, np.sqrt((np.sqrt(0.3**2 + 1.0) - 0.3) / 0.5)), (0.2, 0.1, np.inf)],
+    ids=["barrel", "barrel that unfolds again", "both", "pincushion"],
+)
+def test_a_point_beyond_the_fold_of_the_lens_has_no_pixel(k1: float, k2: float, fold: float) -> None:
+    """Opposite signs, a lens that folds, and then grows again: only what is before the first fold is shown."""
+    lens = Lens(200.0, 200.0, 160.0, 120.0, k1, k2)
+    radii = np.array([0.5, 0.98, 1.02, 1.2, 1.45, 1.6, 3.0]) * (1.0 if np.isinf(fold) else fold)
+    points = np.stack([0.6 * radii, -0.8 * radii, np.ones(len(radii))], axis=1)
+    pixels = lens.project(points)
+    shown = radii < fold
+    assert np.isfinite(pixels[shown]).all() and np.isnan(pixels[~shown]).all()
+    np.testing.assert_allclose(lens.unproject(pixels[shown])[:, :2], (points / np.linalg.norm(points, axis=1, keepdims=True))[shown, :2])
+
+
+@given(st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0)), st.tuples(st.floats(-0.6, 0.6), st.floats(-0.3, 0.3)))
+def test_no_two_points_have_the_same_pixel(flat: tuple[float, float], radial: tuple[float, float]) -> None:
+    lens = Lens(200.0, 200.0, 160.0, 120.0, *radial, 1e-3, -1e-3)
+    ray = lens.unproject(lens.project(np.array([*flat, 1.0])))
+    assert np.isnan(ray).all() or ray[:2] / ray[2] == pytest.approx(flat, abs=1e-6)
+
+
 def test_the_ideal_lens_is_that_of_the_renderer() -> None:
     robot = load_robot("icub")
     scene = Scene(robot, World())
