@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mobee.arrays import Array
+from mobee.errors import InvalidValue
 from mobee.vision.lens import Lens
-from mobee.vision.regions import border, boxes, label, without_holes
+from mobee.vision.regions import border, boxes, checked_picture, label, without_holes
 
 Picture = NDArray[np.uint8]
 
@@ -49,9 +50,12 @@ def find_balls(picture: Picture, intrinsics: Array, distortion: Sequence[float] 
     `intrinsics`: (3, 3) px, the camera's matrix. `distortion`: the coefficients k1 k2 p1 p2 of the lens (Brown and Conrady), or empty.
 
     The outline of a sphere is an ellipse whose centre is not the image of the sphere's centre, but its rays form a circular cone about the
-    ray to the centre. The cone is fitted, so perspective causes no bias. Points where another object hides the ball are ignored.
+    ray to the centre. The cone is fitted, so perspective causes no bias. Points where another object hides the ball are ignored. Raises
+    InvalidValue for a picture of another type, such as a grey one, and for a matrix of another shape.
     """
-    height, width = picture.shape[:2]
+    height, width = checked_picture(picture).shape[:2]
+    if np.shape(intrinsics) != (3, 3):
+        raise InvalidValue(f"intrinsics of shape {np.shape(intrinsics)}: must be the camera's matrix (3, 3), as `lens.matrix`.")
     found = []
     for edge, area in _red_blobs(picture):
         inner = (edge > 0).all(axis=1) & (edge < (width - 1, height - 1)).all(axis=1)

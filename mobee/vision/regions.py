@@ -1,13 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Connected regions of an image mask."""
+"""Pictures and their masks: a check of pictures that are given, and the connected regions of a mask."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mobee.errors import InvalidValue
+
 Mask = NDArray[np.bool_]
 Labels = NDArray[np.intp]
+
+
+def checked_picture(given: Any) -> NDArray[np.uint8]:
+    """Return the given picture unchanged; raises InvalidValue unless it is an array (height, width, 3) of bytes with at least one pixel."""
+    if not (isinstance(given, np.ndarray) and given.dtype == np.uint8 and given.ndim == 3 and given.shape[2] == 3 and given.size):
+        what = f"an array {given.shape} of {given.dtype}" if isinstance(given, np.ndarray) else f"of type {type(given).__name__}"
+        raise InvalidValue(f"the picture is {what}; it must be an array (height, width, 3) of uint8: red, green and blue, each 0 to 255.")
+    return given
 
 
 def label(mask: Mask, diagonal: bool) -> Labels:

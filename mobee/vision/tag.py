@@ -20,6 +20,7 @@ from mobee.rendering.scene import Picture
 from mobee.rendering.solid import Color, LinkSolid, Solid
 from mobee.robot.robot import Robot
 from mobee.vision.lens import Lens, mounted
+from mobee.vision.regions import checked_picture
 
 FAMILY, NUMBER = "DICT_APRILTAG_25h9", 0
 CELLS = (  # of number 0 of the family 25h9, with its border; # is black
@@ -128,11 +129,12 @@ def _squares(cells: list[tuple[int, int]], side: float, first: float) -> Piece:
 def find_tag(picture: Picture, lens: Lens) -> Array | None:
     """Return the corners (4, 2) px, column and row, of the tag in a picture, in the order of `Tag.corners`; None if it is not found.
 
-    `picture`: (H, W, 3), red, green and blue. OpenCV finds the corners with errors of a pixel or two. Then the whole pattern of the tag is
-    fitted to the picture, which reduces the errors to a few hundredths of a pixel. The result is also None if there are several tags, if a
-    side is shorter than 5 px, or if the pattern does not fit. Raises NotInstalled without OpenCV.
+    `picture`: (H, W, 3) bytes, red, green and blue. OpenCV finds the corners with errors of a pixel or two. Then the whole pattern of the
+    tag is fitted to the picture, which reduces the errors to a few hundredths of a pixel. The result is also None if there are several
+    tags, if a side is shorter than 5 px, or if the pattern does not fit. Raises NotInstalled without OpenCV, and InvalidValue for a picture
+    of another type, such as a grey one.
     """
-    gray = _cv2().cvtColor(picture, _cv2().COLOR_RGB2GRAY)
+    gray = _cv2().cvtColor(checked_picture(picture), _cv2().COLOR_RGB2GRAY)
     corners, numbers, _ = _detector().detectMarkers(gray)
     if numbers is None:
         return None

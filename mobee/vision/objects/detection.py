@@ -18,6 +18,7 @@ from mobee.arrays import Array
 from mobee.rendering.scene import Picture
 from mobee.rendering.solid import Color
 from mobee.vision.objects.thing import Thing
+from mobee.vision.regions import checked_picture
 
 AREA = 40.0  # px: smaller regions are ignored
 AROUND = 5  # px: side of the square in which the likeness of a whole pixel is looked up
@@ -92,7 +93,7 @@ def by_color(things: Sequence[Thing]) -> Detector:
     things = [thing for thing in things if _has_hue(thing.color)]
 
     def detect(picture: Picture) -> list[Detection]:
-        channels = np.ascontiguousarray(picture.reshape(-1, 3).T)
+        channels = np.ascontiguousarray(checked_picture(picture).reshape(-1, 3).T)
         spread = channels.max(axis=0) - channels.min(axis=0)
         colored = np.flatnonzero(spread >= LEAST)
         pixels = channels[:, colored].astype(np.float32)

@@ -3,12 +3,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
 import pytest
 
 from mobee import InvalidValue, UnknownName, World, load_world, sphere
 from mobee.rendering.scene import Scene, clutter, room
+from mobee.vision.ball import find_balls
 from mobee.vision.encoders import Moment, Readings, moment_at
 from mobee.vision.imperfections import CameraErrors, Cameras, CameraSettings, camera_errors
 from mobee.vision.lens import DRAGONFLY
@@ -100,6 +103,25 @@ def test_a_picture_without_the_tag_has_none_and_one_that_differs_is_not_aligned(
     corners = np.array([[100.0, 100.0], [130.0, 100.0], [130.0, 130.0], [100.0, 130.0]])
     pattern = np.array([[0.0 if cell == "#" else 1.0 for cell in row] for row in CELLS])
     assert aligned(empty[..., 0].astype(np.float32), DRAGONFLY, np.pad(pattern, 1, constant_values=1.0), 1, corners) is None
+
+
+@pytest.mark.parametrize("find", [lambda given: find_tag(given, DRAGONFLY), lambda given: find_balls(given, DRAGONFLY.matrix)])
+@pytest.mark.parametrize(
+    "given",
+    [
+        np.zeros((24, 32), np.uint8), np.zeros((24, 32, 1), np.uint8), np.zeros((24, 32, 4), np.uint8), np.zeros((0, 32, 3), np.uint8),
+        np.zeros((24, 32, 3)), [[[0, 0, 0]]], None,
+    ],
+    ids=["grey", "one channel", "RGBA", "empty", "floats", "list", "none"],
+)  # fmt: skip
+def test_what_is_no_picture_in_colour_is_refused(find: Any, given: Any) -> None:
+    with pytest.raises(InvalidValue, match=r"the picture is .*; it must be an array \(height, width, 3\) of uint8"):
+        find(given)
+
+
+def test_balls_are_found_with_the_matrix_of_a_camera_only() -> None:
+    with pytest.raises(InvalidValue, match=r"intrinsics of shape \(\): .* `lens.matrix`"):
+        find_balls(np.zeros((24, 32, 3), np.uint8), DRAGONFLY)  # type: ignore[arg-type]
 
 
 def test_a_tag_needs_a_marker_and_a_size() -> None:

@@ -20,6 +20,7 @@ from mobee.rendering.camera import Floats
 from mobee.rendering.scene import Picture
 from mobee.robot.writing import write_whole
 from mobee.vision.objects.thing import KINDS, Thing
+from mobee.vision.regions import checked_picture
 
 FORMAT = "mobee detector 1"
 KEY = "mobee"  # of the metadata
@@ -76,7 +77,7 @@ class Network:
             raise InvalidValue(f"OpenCV cannot read the network: {error.err}") from None
 
         def run(picture: Picture) -> Floats:
-            net.setInput(picture.transpose(2, 0, 1)[None] / np.float32(MIDDLE) - np.float32(1.0))
+            net.setInput(checked_picture(picture).transpose(2, 0, 1)[None] / np.float32(MIDDLE) - np.float32(1.0))
             try:
                 found: Floats = np.clip(net.forward()[0], 0.0, 1.0)
             except cv2.error as error:

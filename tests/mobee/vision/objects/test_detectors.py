@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,8 @@ from mobee.rendering.scene import Scene, clutter, room
 from mobee.vision.encoders import Moment
 from mobee.vision.imperfections import CameraErrors, Cameras, CameraSettings
 from mobee.vision.objects.detection import Detection
-from mobee.vision.objects.detectors import detector_of
+from mobee.vision.objects.detectors import by_network, detector_of
+from mobee.vision.objects.learned.network import network_of
 from mobee.vision.objects.placing import eyes_at, locate_all
 from mobee.vision.objects.thing import Thing, things_in
 from tests.mobee.vision.calibration.synthetic import RIG, ROBOT
@@ -49,6 +52,15 @@ def test_a_detector_is_chosen_by_name_by_module_and_name_or_given() -> None:
         detector_of("colour", THINGS)
     with pytest.raises(InvalidValue, match="cannot be called"):
         detector_of("mobee.vision.objects.detectors:DETECTORS", THINGS)
+
+
+@pytest.mark.parametrize("wrong", [picture_with(BLUE)[..., 0], picture_with(BLUE) / 255.0, None], ids=["grey", "floats", "none"])
+def test_what_is_no_picture_in_colour_is_refused_by_the_detectors(wrong: Any) -> None:
+    outputs = np.zeros((8, len(THINGS))), np.zeros(len(THINGS))
+    network = network_of(THINGS, (np.zeros((150, 8)), np.zeros(8)), (np.zeros((8, 8)), np.zeros(8)), outputs)
+    for detect in (detector_of("color", THINGS), by_network(network, THINGS)):
+        with pytest.raises(InvalidValue, match=r"the picture is .* of uint8"):
+            detect(wrong)
 
 
 @pytest.mark.parametrize("brightness", [0.5, 1.0])
