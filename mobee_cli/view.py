@@ -95,8 +95,6 @@ def show(robot: Robot, world: World | None, save: Path | None, stretches: Sequen
         if save is not None:
             raise
         return 0
-    except MobeeError as error:
-        raise UserError(str(error), ENVIRONMENT) from None
     if save is None:
         raise UserError("the server of the page has ended unexpectedly; --save FILE.rrd writes a recording instead")
     print(f"{save}: open it with `rerun {save}`")

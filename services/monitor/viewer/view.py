@@ -5,8 +5,7 @@ from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,9 +14,9 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from mobee.arrays import Array
-from mobee.errors import MobeeError
 from mobee.model.world import World
 from mobee.robot.robot import Motor, Robot
+from mobee.robot.writing import write_whole
 from services.monitor.viewer.blueprint import BACKGROUND, eye_of
 from services.monitor.viewer.figure import TIMELINE, Figure
 from services.monitor.viewer.files import ViewerFiles
@@ -97,16 +96,15 @@ def view(
 
     `world`: objects around the robot. `save`: file to write (.rrd); None: show a page. `report` is called with the page's address when all
     data are logged. `stretches`: sections of the motion; None: a sweep through the ranges of all motors. `solids`: draw the solids (volumes
-    by which contacts are found) instead of the visuals (surfaces in the robot file). Raises MobeeError if the file cannot be written.
+    by which contacts are found) instead of the visuals (surfaces in the robot file). Raises OSError if the file cannot be written.
     """
     with tempfile.TemporaryDirectory(prefix="mobee-view-") as private:
         file = Path(private) / "view.rrd" if save is None else save
         stream = rr.RecordingStream("mobee")
-        with _explained(file):
-            stream.set_sinks(rr.FileSink(file), default_blueprint=layout(robot))
+        kept = stream.memory_recording()  # Rerun's own writer of files waits for ever, or reports nothing, if the disk is full
+        stream.send_blueprint(layout(robot), make_active=False, make_default=True)
         _log(stream, robot, world, sweep(robot) if stretches is None else stretches, solids)
-        with _explained(file):
-            stream.flush()  # an error of the file, such as a full disk, is raised nowhere else
+        write_whole(file, kept.drain_as_bytes())
         stream.disconnect()
         if save is None:
             site = Site(Board(), "", NoControls(), None, ViewerFiles(Path(private)).path, lambda: 0.0, {"view.rrd": file})
@@ -114,15 +112,6 @@ def view(
             report(f"http://{HOST}:{server.port}/viewer.html?recording=view.rrd")
             while True:
                 time.sleep(3600.0)
-
-
-@contextmanager
-def _explained(file: Path) -> Iterator[None]:
-    """Turn an error of Rerun into a MobeeError with the name of the file."""
-    try:
-        yield
-    except RuntimeError as error:
-        raise MobeeError(f"{file}: the recording cannot be written ({error}). Give another file, or free space on the disk.") from None
 
 
 def _log(stream: rr.RecordingStream, robot: Robot, world: World | None, stretches: Sequence[Stretch], solids: bool) -> None:
