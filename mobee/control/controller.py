@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ from mobee.control.forces import (
 from mobee.control.gains import Gains
 from mobee.control.law import Command, Law, Modality, largest_step, require_stable
 from mobee.control.reach_forces import ReachForces
-from mobee.errors import InvalidValue, UnknownName
+from mobee.errors import InvalidValue, MobeeError, UnknownName
 from mobee.model.engine import MAX_HANDS
 from mobee.model.masses import gravity_torque
 from mobee.reach import ReachTarget, checked_target
@@ -115,6 +115,10 @@ class Controller:
         self._attractor, self._state = self.robot.home.copy(), self.law.at_rest(self.robot.home)
         self.clear()
         self.reset(self.robot.home)
+
+    def __reduce__(self) -> NoReturn:
+        """Raise MobeeError: a copy (`copy.copy`, pickle) would share its state, which the compiled core changes, with the original."""
+        raise MobeeError("a controller cannot be copied or pickled: the core holds its state. Make a new one, as Controller(model, gains).")
 
     @property
     def attractor(self) -> Array:

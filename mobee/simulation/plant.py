@@ -6,7 +6,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,7 +15,7 @@ from mobee.arrays import Array, checked_count, real_array
 from mobee.control import Controller, Gains
 from mobee.control.forces import Propagate, Term
 from mobee.control.law import Modality
-from mobee.errors import ActionInterrupted, InvalidValue
+from mobee.errors import ActionInterrupted, InvalidValue, MobeeError
 from mobee.model.contact import links_moved, touched_in
 from mobee.model.model import engine_of
 from mobee.plant import Outcome
@@ -135,6 +135,10 @@ class OfflinePlant:
         self._acting = 0  # number of acting parts when the ticks began
         self._period = 0  # ticks
         self._callback: Callable[[float], None] | None = None
+
+    def __reduce__(self) -> NoReturn:
+        """Raise MobeeError: a copy (`copy.copy`, pickle) would share its state, which the compiled core changes, with the original."""
+        raise MobeeError("a plant cannot be copied or pickled: the core holds its state. Make a new one, as OfflinePlant(model, seed).")
 
     def restart(self, seed: int, q: ArrayLike | None = None) -> None:
         """Start again at rest and at time 0; afterwards the plant behaves exactly like a new plant with this seed, but this call is faster.

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+import copy
+import pickle
 from dataclasses import replace
 from typing import Any
 
@@ -10,7 +12,7 @@ import pytest
 from mobee.arrays import Array
 from mobee.control import Gains, Settle
 from mobee.control.reach import Reacher
-from mobee.errors import ActionInterrupted, InvalidValue, UnknownName
+from mobee.errors import ActionInterrupted, InvalidValue, MobeeError, UnknownName
 from mobee.model import sphere
 from mobee.model.model import Model
 from mobee.model.world_file import load_world
@@ -173,6 +175,14 @@ def test_bad_input_is_refused() -> None:
     for dt in (0.04, "0.01"):
         with pytest.raises(InvalidValue, match="tick"):
             arm_plant(gains=Gains.published_2014(), dt=dt)
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, pickle.dumps])
+def test_a_copy_that_would_move_with_its_original_is_refused(copied: Any) -> None:
+    plant = arm_plant()
+    for thing, remedy in ((plant, "OfflinePlant"), (plant.controller, "Controller")):
+        with pytest.raises(MobeeError, match=rf"cannot be copied or pickled.*as {remedy}\(model"):
+            copied(thing)
 
 
 @pytest.mark.parametrize("target", [["a"] * 6, [1j] * 6, [1.0] * 4, [np.nan] * 6, [99] * 6, [[0.0] * 6]])
