@@ -22,6 +22,7 @@ from mobee.errors import InvalidValue
 RECORDS = Path(__file__).parent.parent / "records"
 MAX_BYTES, MAX_ALL = 2_000_000, 10_000_000  # of one archive, and of all together
 _SUFFIX = ".tar.xz"
+_BITS = ((3, 0, 2), (3, 0, 0), (0, 2, 2), (0, 3, 3))  # lc, lp, pb of LZMA: for text, for bytes, and for numbers of 4 and of 8 bytes
 _NO_TIME = (1980, 1, 1, 0, 0, 0)  # the same files give the same archive
 
 
@@ -81,12 +82,17 @@ def keep_record(name: str, run: Path, versions: Path, kept: Sequence[str], confi
 def _archive(members: Mapping[str, bytes]) -> bytes:
     """Return an archive with these files, given as contents by name."""
     content = io.BytesIO()
-    with lzma.open(content, "wb", preset=9 | lzma.PRESET_EXTREME) as packed, tarfile.open(fileobj=packed, mode="w") as archive:
+    with tarfile.open(fileobj=content, mode="w") as archive:
         for name, data in members.items():
             about = tarfile.TarInfo(name)  # without a time or an owner: the same files give the same archive
             about.size = len(data)
             archive.addfile(about, io.BytesIO(data))
-    return content.getvalue()
+    return min((_compressed(content.getvalue(), *bits) for bits in _BITS), key=len)
+
+
+def _compressed(data: bytes, lc: int, lp: int, pb: int) -> bytes:
+    settings = {"id": lzma.FILTER_LZMA2, "preset": 9 | lzma.PRESET_EXTREME, "lc": lc, "lp": lp, "pb": pb}
+    return lzma.compress(data, filters=[settings])
 
 
 def _members(path: Path) -> dict[str, bytes]:
