@@ -227,7 +227,7 @@ def finished_runs(runs: Path, confirms: bool = False) -> list[Path]:
 
 def _counts(run: Path) -> bool:
     is_finished = (run / RESULTS).exists() or any(run.glob(f"*/{RESULTS}"))
-    return is_finished and not read(run / CONFIG)["options"].get("quick")
+    return is_finished and not options_of(run, experiment_of(run)).get("quick")
 
 
 def _confirms(run: Path) -> bool:

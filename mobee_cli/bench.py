@@ -6,7 +6,6 @@ from __future__ import annotations
 import argparse
 import importlib
 import json
-import signal
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -231,7 +230,6 @@ def run(arguments: argparse.Namespace) -> int:
     from experiments.kit.live.launch import LaunchFailed
     from experiments.kit.plots import MatplotlibMissing
 
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C, so that a live system that the benchmark has started is stopped
     try:
         return _draw(arguments) if getattr(arguments, "figure", None) else _measure(arguments)
     except (AgainstFailed, LaunchFailed, MatplotlibMissing) as error:

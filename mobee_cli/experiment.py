@@ -9,7 +9,6 @@ from __future__ import annotations
 import argparse
 import json
 import shutil
-import signal
 import textwrap
 import time
 from collections.abc import Sequence
@@ -167,7 +166,6 @@ def _wrapped(notes: str) -> str:
 
 
 def _run(experiment: Experiment, options: argparse.Namespace) -> int:
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C, so that a live system that the run has started is stopped
     folder: Path | None = options.resume
     try:
         own = {key: value for key, value in vars(options).items() if key not in _NOT_OPTIONS}

@@ -25,7 +25,11 @@ def _is_program(name: str) -> bool:
     try:
         found = find_spec(name)
         return found is not None and (found.submodule_search_locations is None or find_spec(f"{name}.__main__") is not None)
-    except (ImportError, ValueError):  # there is no such package; not a name
+    except ModuleNotFoundError as error:
+        if f"{name}.".startswith(f"{error.name}."):  # the module itself, or a package of its name
+            return False
+        raise  # it needs a package that is not installed
+    except (ImportError, ValueError):  # not a name
         return False
 
 

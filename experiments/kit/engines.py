@@ -119,11 +119,17 @@ def _signals_of_cells() -> Iterator[None]:
     both = {signal.SIGTERM, signal.SIGINT}
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_BLOCK, both)
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
+    signal.signal(signal.SIGTERM, _end_once)
     signal.signal(signal.SIGINT, lambda *_: None)
     yield
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, both)
+
+
+def _end_once(*_: object) -> None:
+    """End this process by SystemExit; a second signal must not interrupt what the cell does then."""
+    signal.signal(signal.SIGTERM, lambda *_: None)
+    sys.exit(1)
 
 
 def _end_with_parent() -> None:
@@ -144,8 +150,9 @@ def _exit_reason(code: int | None) -> str:
 def _end(workers: Sequence[_Worker]) -> None:
     for worker in workers:
         worker.process.terminate()
+    give_up = time.monotonic() + _END_TIMEOUT
     for worker in workers:
-        worker.process.join(_END_TIMEOUT)
+        worker.process.join(max(0.0, give_up - time.monotonic()))
         if worker.process.is_alive():
             worker.process.kill()
             worker.process.join()

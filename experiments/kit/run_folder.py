@@ -28,6 +28,7 @@ import msgspec
 
 from experiments.registry import all_names, current_name
 from mobee.errors import InvalidValue
+from mobee.robot.writing import write_whole
 
 PACKAGES = ("mobee", "numpy", "python-fcl", "mujoco", "matplotlib")
 SOURCES = ("core", "mobee", "experiments")
@@ -150,9 +151,7 @@ def write(path: Path, content: Mapping[str, Any]) -> None:
 
     If the file cannot be written, for example on a full disk, or if the program is killed, the former file stays as it is.
     """
-    unfinished = path.with_suffix(".unfinished")
-    unfinished.write_text(_json(content))
-    unfinished.replace(path)
+    write_whole(path, _json(content).encode())
 
 
 def _json(content: Mapping[str, Any]) -> str:

@@ -96,10 +96,10 @@ def find_path(trm: Roadmap, start: Array, goal: list[float]) -> dict[str, Any]:
 def _carries(trm: Roadmap) -> NDArray[np.bool_]:
     """Return whether each motor moves a marker that the names of the roadmap's coordinates or costs have, (n,)."""
     robot, known = trm.model.robot, tables(trm.model.robot)
-    words = " ".join([*trm.names, *trm.settings.get("costs", ())]).split()
+    text = f" {' '.join([*trm.names, *trm.settings.get('costs', ())])} "
     above = np.zeros(len(robot.joints), dtype=bool)
     for name, marker in robot.markers.items():
-        if name in words:
+        if f" {name} " in text:  # a name may contain blanks
             above[known.ancestry[marker.link]] = True
     moves: NDArray[np.bool_] = np.abs(known.coupling) @ above > 0.0
     return moves

@@ -173,6 +173,7 @@ class BusPlant:
         part's goal to another service.
         """
         self.robot.marker(marker)
+        self._require_awake(part)  # before the target is presented again
         asked = self._reaches.asked()
         require_apart(self.robot, part, marker, *self._reaches.attached_to())
         sent = self._perform(part, "reach", ReachFor, marker=marker, stay=stay, **asked)

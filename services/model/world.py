@@ -142,7 +142,7 @@ class WorldServer:
         if TARGET in self._model.world.objects and other != who and self._service.alive.get(other):
             raise CallRefused(
                 "owned",
-                f"{other} presents {TARGET!r}, and only one service at a time can: {who} can after {other} has ended. "
+                f"{other} presents {TARGET!r}, and only one service at a time can: {who} can after {other} has ended, or rests. "
                 "A scenario can have one agent with targets.",
             )
         self._presenter = who

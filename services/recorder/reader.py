@@ -39,7 +39,9 @@ class Recording:
         except OSError as error:
             raise MobeeError(f"{error.filename}: cannot be read ({error.strerror})") from None
         if not self.files:
-            raise MobeeError(f"{place}: there is no messages-*.mcap; `mobee launch` records unless it is started with --no-record")
+            raise MobeeError(
+                f"{place}: there is no messages-*.mcap with content; `mobee launch` records unless it is started with --no-record"
+            )
 
     def settings(self) -> dict[str, str]:
         """Return the settings files of the run that are attached to the recording: text by file name."""

@@ -215,12 +215,14 @@ def test_a_killed_sweep_continues_after_its_finished_cells(tmp_path, how):
     assert all((tmp_path / "cells" / name).stat().st_mtime_ns == when for name, when in finished.items())
 
 
-@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
-def test_the_cells_of_a_killed_sweep_give_back_what_they_hold(tmp_path, how):
-    """As a cell that has started a live system."""
+@pytest.mark.parametrize(
+    ("how", "group"), [(signal.SIGKILL, False), (signal.SIGTERM, False), (signal.SIGTERM, True), (signal.SIGINT, True)]
+)
+def test_the_cells_of_a_killed_sweep_give_back_what_they_hold(tmp_path, how, group):
+    """As a cell that has started a live system.  If the whole group is killed, workers get a second signal when their parent ends."""
     process = sweep(tmp_path, 0.0, "--holds", str(tmp_path / "held"))
     wait_until(lambda: len(list(tmp_path.glob("held-*"))) == 2)
-    os.killpg(process.pid, how) if how == signal.SIGINT else process.send_signal(how)
+    os.killpg(process.pid, how) if group else process.send_signal(how)
     process.communicate(timeout=30)
     assert not list(tmp_path.glob("held-*"))
 

@@ -38,11 +38,12 @@ def work(cell: Cell) -> dict[str, object]:
         os.kill(os.getpid(), signal.SIGKILL)
     if holds := cell.settings.get("holds"):
         held = Path(f"{holds}-{cell.seed}")
-        held.touch()
         try:
+            held.touch()
             time.sleep(60.0)
         finally:
-            held.unlink()
+            time.sleep(0.5)  # as a live system that ends
+            held.unlink(missing_ok=True)
     time.sleep(cell.settings.get("seconds", 0.0))
     if log := cell.settings.get("log"):
         with open(log, "a") as file:

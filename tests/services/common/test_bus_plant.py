@@ -8,9 +8,10 @@ import pytest
 
 from bus_schema import VERSION, keys
 from bus_schema.messages import Geometry
-from bus_schema.rpc import Empty, ObjectState, World
+from bus_schema.rpc import AddObject, Done, Empty, ObjectState, OneName, World
 from mobee import load_robot
-from mobee.errors import InvalidValue, MobeeError, UnknownName
+from mobee.errors import ActionInterrupted, InvalidValue, MobeeError, UnknownName
+from mobee.reach import ReachTarget
 from services.common.bus_plant import BusPlant
 from services.common.config import ServiceConfig
 from services.common.service import Service
@@ -18,6 +19,7 @@ from tests.services.fake_controller import FakeController
 from tests.services.harness import rig
 
 ROBOT = load_robot("icub")
+CHANGES: list[str] = []  # calls that change the world
 
 
 @pytest.fixture(scope="module")
@@ -26,6 +28,8 @@ def plant(tmp_path_factory: pytest.TempPathFactory) -> Iterator[BusPlant]:
         controller = FakeController(made, "torso")
         ball = ObjectState("ball", Geometry("sphere", [0.03]), [-0.3, 0.1, 0.1], [1.0, 0.0, 0.0, 0.0], role="target", link="l_hand")
         made.serve(keys.world_rpc("list"), Empty, lambda *_: World(v=VERSION, objects=[ball]))
+        for call, request in (("add", AddObject), ("remove", OneName)):
+            made.serve(keys.world_rpc(call), request, lambda *_, call=call: CHANGES.append(call) or Done(v=VERSION))
         yield BusPlant(service, ROBOT, ("torso",))
         controller.close()
 
@@ -56,3 +60,12 @@ def test_an_object_that_the_part_carries_with_the_marker_is_not_reached_for(plan
     plant.present_object("ball")
     with pytest.raises(InvalidValue, match="'ball' is attached to the link 'l_hand', which torso moves"):
         plant.reach("torso", "right_palm")
+
+
+def test_a_plant_that_rests_does_not_present_its_target_again(plant: BusPlant) -> None:
+    CHANGES.clear()
+    plant.present(ReachTarget(np.array([-0.3, 0.0, 0.1])))
+    plant.rest()
+    with pytest.raises(ActionInterrupted, match="this service rests"):
+        plant.reach("torso", "right_palm")
+    assert CHANGES == ["add", "remove"]
