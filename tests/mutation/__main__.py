@@ -24,6 +24,7 @@ SIM, CONTROLLER = "tests/services/robot_sim", "tests/services/controller"
 SAFETY = {  # between a command and a motor: all mutants
     "services/robot_sim/gate.py": (f"{SIM}/test_gate.py", f"{SIM}/test_admission.py"),
     "services/robot_sim/guard.py": (
+        f"{SIM}/test_guard.py",
         f"{SIM}/test_process_admission.py",
         f"{SIM}/test_process_modes.py",
         f"{SIM}/test_process_streams.py",
