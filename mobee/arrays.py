@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Array types, and checks of arguments: of arrays, and of a number of threads."""
+"""Array types, and checks of arguments: arrays, numbers, counts, and numbers of threads."""
 
 from __future__ import annotations
 
 import reprlib
 from numbers import Real
+from typing import TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -41,15 +42,20 @@ def checked_seed(seed: int) -> int:
     return int(seed)
 
 
-def checked_count(what: str, count: int) -> int:
-    """Return the given count as an int; raises InvalidValue, with the name `what`, unless it is a whole number of at least 0."""
-    if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 0:
-        raise InvalidValue(f"{what}={count!r}: give a whole number, 0 or more.")
+def is_number(value: object) -> TypeGuard[float]:
+    """Return whether a value is a real number, such as an int, a float, a Fraction or a scalar of NumPy; NaN and infinity are too."""
+    return isinstance(value, Real)
+
+
+def checked_count(what: str, count: int, least: int = 0) -> int:
+    """Return the given count as an int; raises InvalidValue, with the name `what`, unless it is a whole number of at least `least`."""
+    if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < least:
+        raise InvalidValue(f"{what}={count!r}: give a whole number, {least} or more.")
     return int(count)
 
 
 def checked_threads(threads: int) -> int:
-    """Return the given number of threads unchanged; raises InvalidValue if it is not a whole number from 1 to MAX_THREADS (1024)."""
-    if isinstance(threads, bool) or not isinstance(threads, int) or not 1 <= threads <= MAX_THREADS:
+    """Return the given number of threads as an int; raises InvalidValue if it is not a whole number from 1 to MAX_THREADS (1024)."""
+    if isinstance(threads, bool) or not isinstance(threads, int | np.integer) or not 1 <= threads <= MAX_THREADS:
         raise InvalidValue(f"threads={threads!r}: give a whole number from 1 to {MAX_THREADS}.")
-    return threads
+    return int(threads)

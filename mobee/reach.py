@@ -10,7 +10,7 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mobee.arrays import Array, real_array
+from mobee.arrays import Array, is_number, real_array
 from mobee.errors import InvalidValue, UnknownName
 from mobee.plant import Outcome, Plant
 
@@ -42,7 +42,7 @@ class ReachTarget:
         where = _triple(self.position, "position")
         if np.abs(where).max() > MAX_DISTANCE:
             raise InvalidValue(f"position {where.tolist()} of the target: must be within {MAX_DISTANCE:g} m of the root frame's origin")
-        if not (isinstance(self.radius, int | float | np.number) and 0.0 < self.radius <= MAX_DISTANCE):
+        if not (is_number(self.radius) and 0.0 < self.radius <= MAX_DISTANCE):
             raise InvalidValue(f"radius {self.radius!r} of the target: must be a length above 0 m, at most {MAX_DISTANCE:g} m")
         if self.aim not in AIMS:
             raise UnknownName("aim", self.aim, AIMS)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mobee.arrays import Array
+from mobee.arrays import Array, checked_count
 from mobee.control.forces import checked
 from mobee.errors import InvalidValue
 from mobee.learning.reaching.predictors import RewardPredictor
@@ -66,8 +66,7 @@ class Assist:
             InvalidValue: the part does not carry the arm, or `levels` is not valid.
             UnknownName: the robot does not have the part or the arm.
         """
-        if isinstance(levels, bool) or not isinstance(levels, int) or levels < 2:
-            raise InvalidValue(f"levels={levels!r}: give a whole number, 2 or more.")
+        levels = checked_count("levels", levels, 2)
         self.model, self.part = model, model.robot.part(part)
         self._worth, self._base = worth, base_link(model.robot, arm)
         robot, span = model.robot, self.part.slice

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mobee.arrays import Array
+from mobee.arrays import Array, is_number
 from mobee.control.forces import checked
 from mobee.errors import InvalidValue
 from mobee.model.masses import gravity_torque
@@ -34,8 +34,8 @@ class BumpWatch:
         """
         if not len(motors):
             raise InvalidValue("motors: none is named; name those whose torques show a bump, such as the shoulder's")
-        if not 0.0 < threshold < np.inf:
-            raise InvalidValue(f"threshold {threshold} N m: must be a finite torque above 0")
+        if not (is_number(threshold) and 0.0 < threshold < np.inf):
+            raise InvalidValue(f"threshold {threshold!r} N m: must be a finite torque above 0")
         self._robot, self._threshold = robot, threshold
         self._columns = np.array([robot.motor_index(name) for name in motors])
         self.begin()

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mobee._core import Table
 from mobee._core.law import state_term_names, term_names
-from mobee.arrays import Array
+from mobee.arrays import Array, is_number
 from mobee.control.forces import (
     Forces,
     Propagate,
@@ -87,7 +87,7 @@ class Controller:
             raise InvalidValue(f"model is {model!r}; it must be a Model, as Model(robot, world).")
         if not isinstance(gains, Gains | None):
             raise InvalidValue(f"gains is {gains!r}; it must be Gains, as Gains.default() or Gains.named(name), or None.")
-        if not (isinstance(speed_scale, int | float | np.number) and 0 < speed_scale <= 1):
+        if not (is_number(speed_scale) and 0 < speed_scale <= 1):
             raise InvalidValue(f"speed_scale {speed_scale!r}: must be above 0 and at most 1")
         if modality not in ("position", "velocity", "torque"):
             raise UnknownName("modality", modality, ("position", "velocity", "torque"))

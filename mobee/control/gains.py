@@ -12,7 +12,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from mobee._core import law as core
-from mobee.arrays import Array
+from mobee.arrays import Array, is_number
 from mobee.errors import InvalidValue, UnknownName
 from mobee.robot.motor_units import LIMIT_WIDTH, motor_units
 from mobee.robot.robot import Robot
@@ -50,9 +50,9 @@ class Settle:
     def __post_init__(self) -> None:
         for name in ("speed", "acceleration", "interval", "timeout"):
             value = getattr(self, name)
-            if not (isinstance(value, int | float | np.number) and 0 < value < np.inf):
+            if not (is_number(value) and 0 < value < np.inf):
                 raise InvalidValue(f"settle {name} {value!r}: must be finite and above 0")
-        if not (isinstance(self.first_check, int | float | np.number) and 0 <= self.first_check < np.inf):
+        if not (is_number(self.first_check) and 0 <= self.first_check < np.inf):
             raise InvalidValue(f"settle first_check {self.first_check!r} s: must be a finite time, not negative")
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from mobee._core import INTERVAL, Table, address, numbers, view
 from mobee._core import law as core
-from mobee.arrays import Array, Ints
+from mobee.arrays import Array, Ints, is_number
 from mobee.control.gains import Gains
 from mobee.errors import InvalidValue
 from mobee.robot.motor_units import fine_units, limit_zones, motor_units
@@ -225,7 +225,7 @@ def largest_step(robot: Robot, gains: Gains) -> float:
 
 def require_stable(robot: Robot, gains: Gains, dt: float) -> None:
     """Raise InvalidValue, with motor and violated bound, if the control law is unstable at steps of dt [s], or if dt is not valid."""
-    if not (isinstance(dt, int | float | np.number) and 0 < dt < np.inf):
+    if not (is_number(dt) and 0 < dt < np.inf):
         raise InvalidValue(f"time step {dt!r} s: must be a finite time above 0")
     bound = stability_bound(robot, gains)
     if dt < bound.step:

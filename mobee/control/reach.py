@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from mobee.arrays import Array
+from mobee.arrays import Array, is_number
 from mobee.control.forces import checked
 from mobee.errors import InvalidValue
 from mobee.reach import ReachTarget
@@ -73,7 +73,7 @@ def reach_path(
     """
     model.robot.marker(marker)
     target = ReachTarget(position, normal=normal)
-    if not (isinstance(tolerance, int | float | np.number) and isinstance(steps, int | float | np.number) and tolerance > 0 and steps > 0):
+    if not (is_number(tolerance) and is_number(steps) and tolerance > 0 and steps > 0):
         raise InvalidValue(f"tolerance {tolerance!r} and {steps!r} steps: both must be above 0")
     low, high = model.robot.limits.T
     path = [checked("start", start, len(low))]
@@ -174,7 +174,7 @@ class Reacher:
         reached; an error of 1 rad between the normals counts as 0.1 m. Raises UnknownName for an unknown marker. Raises InvalidValue for a
         position, normal or tolerance that is not valid, or if none of the motors that may move moves the marker.
         """
-        if not (isinstance(tolerance, int | float | np.number) and 0 < tolerance < np.inf):
+        if not (is_number(tolerance) and 0 < tolerance < np.inf):
             raise InvalidValue(f"tolerance {tolerance!r} m: must be a finite distance above 0")
         self._controller, self._marker, self._tolerance = controller, marker, tolerance
         self.target = ReachTarget(position, normal=normal)
@@ -191,7 +191,7 @@ class Reacher:
         motion. The force on the marker continues after every status; `stop` ends it. Raises InvalidValue if q has another shape or is not
         finite, or if dt is not a finite time above 0.
         """
-        if not (isinstance(dt, int | float | np.number) and 0.0 < dt < np.inf):
+        if not (is_number(dt) and 0.0 < dt < np.inf):
             raise InvalidValue(f"dt {dt!r} s: must be a finite time above 0")
         found = marker_error(self._controller.model, self._marker, self.target, checked("q", q, len(self._controller.robot.motors)))
         self.angle = found.angle

@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from mobee.arrays import Array
+from mobee.arrays import Array, is_number
 from mobee.control.forces import checked
 from mobee.control.law import stack_clauses
 from mobee.errors import InvalidValue
@@ -53,11 +53,11 @@ class ReflexSettings:
     def __post_init__(self) -> None:
         for name in ("confirm", "release", "brake", "dead_time"):
             value = getattr(self, name)
-            if not (isinstance(value, int | float | np.number) and 0.0 <= value < math.inf):
+            if not (is_number(value) and 0.0 <= value < math.inf):
                 raise InvalidValue(f"reflex {name} {value!r} s: must be a finite time, not negative")
         for name in ("history", "pace"):
             value = getattr(self, name)
-            if not (isinstance(value, int | float | np.number) and 0.0 < value < math.inf):
+            if not (is_number(value) and 0.0 < value < math.inf):
                 raise InvalidValue(f"reflex {name} {value!r}: must be finite and above 0")
 
     @classmethod

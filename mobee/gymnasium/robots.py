@@ -98,7 +98,8 @@ def whole(what: str, given: Any) -> int:
 def checked_render_mode(given: Any, *drawn: str) -> Any:
     """Return the given render mode; raises InvalidValue unless it is None, or one of the modes that the environment has (`drawn`)."""
     if given is not None and given not in drawn:
-        raise InvalidValue(f"render_mode={given!r}: give {' or '.join([*map(repr, drawn), 'None'])}.")
+        other = "" if drawn else ', or vectorization_mode="sync", which can draw'
+        raise InvalidValue(f"render_mode={given!r}: give {' or '.join([*map(repr, drawn), 'None'])}{other}.")
     return given
 
 

@@ -4,12 +4,13 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
-from mobee.arrays import Array, Ints
+from mobee.arrays import Array, Ints, is_number
 from mobee.errors import InvalidValue
 from mobee.learning.neighbours import NO_ACTION
 from mobee.learning.space import Space
@@ -32,9 +33,9 @@ class External:
     """
 
     def __init__(self, space: Space, goal: Goal, weight: float | None = None) -> None:
-        if weight is not None and not (isinstance(weight, int | float) and np.isfinite(weight)):
+        if weight is not None and not (is_number(weight) and math.isfinite(weight)):
             raise InvalidValue(f"goal_weight={weight!r}: give a finite factor, or None to replace the intrinsic reward.")
-        self.weight = weight
+        self.weight = None if weight is None else float(weight)
         exists = space.goals != NO_ACTION
         rewards = _rewards(space, goal)
         if rewards.shape != exists.shape or not np.isfinite(rewards[exists]).all():

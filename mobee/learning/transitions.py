@@ -5,13 +5,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from math import log1p
+from math import isfinite, log1p
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mobee.arrays import Array, Ints
+from mobee.arrays import Array, Ints, is_number
 from mobee.errors import InvalidValue, UnknownName
 from mobee.learning.neighbours import NO_ACTION
 from mobee.learning.runs import OutcomeRuns
@@ -401,7 +401,7 @@ class TransitionModel(Tabled):
         """Return the user's divergence for counts after and before; raises InvalidValue if the function returns no finite number."""
         assert self._function is not None
         value = self._function(after / after.sum(), before / before.sum())
-        if not (isinstance(value, int | float | np.integer | np.floating) and np.isfinite(value)):
+        if not (is_number(value) and isfinite(value)):
             raise InvalidValue(f"divergence {self.divergence!r} returned {value!r}: return a finite number, in nats.")
         return float(value)
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mobee._core.rays import Rays, cast
-from mobee.arrays import Array
+from mobee.arrays import Array, real_array
 from mobee.errors import InvalidValue, UnknownName
 from mobee.rendering.solid import Solid, packed
 
@@ -89,9 +89,10 @@ def camera_axes(view: str | tuple[float, float]) -> Array:
         if view not in VIEWS:
             raise UnknownName("view", view, VIEWS)
         view = VIEWS[view]
-    if np.shape(view) != (2,) or not np.isfinite(view).all():
+    angles = real_array("view", view)
+    if angles.shape != (2,) or not np.isfinite(angles).all():
         raise InvalidValue(f"view {view!r}: must be azimuth and elevation, two finite numbers [degrees], or one of {', '.join(VIEWS)}.")
-    a, e = np.deg2rad(view)
+    a, e = np.deg2rad(angles)
     ahead = np.array([np.cos(a) * np.cos(e), -np.sin(a) * np.cos(e), -np.sin(e)])
     right = np.array([-np.sin(a), -np.cos(a), 0.0])
     return np.array([right, np.cross(right, ahead), ahead])

@@ -243,7 +243,7 @@ def marker_cloud(
         NotInstalled: Matplotlib is not installed.
     """
     pose, names = model.evaluate(np.atleast_2d(np.asarray(q, dtype=np.float64))), [markers] if isinstance(markers, str) else list(markers)
-    if not names or not len(pose.q) or not views:
+    if not names or not len(pose.q) or not len(views):
         raise InvalidValue(f"{len(pose.q)} poses, {len(names)} markers and {len(views)} views: must be at least one of each")
     places = np.concatenate([pose.position(name) for name in names])
     given = pose.position(names[0])[:, 2] if values is None else np.asarray(values, dtype=np.float64)

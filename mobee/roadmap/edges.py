@@ -75,7 +75,7 @@ def checked(
     """
     if not step > 0.0:
         raise InvalidValue(f"step {step} m: it must be above 0.")
-    checked_threads(threads)
+    threads = checked_threads(threads)
     solid = solid_model(model)
     vertices, ends = np.unique(edges, return_inverse=True)
     q, ends = np.ascontiguousarray(q[vertices], dtype=np.float64), ends.reshape(-1, 2)

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mobee.arrays import Array, Ints, real_array
+from mobee.arrays import Array, Ints, checked_count, real_array
 from mobee.errors import InvalidValue, MobeeError
 from mobee.model.model import Model
 from mobee.roadmap.ik.problem import chosen, solid_model
@@ -375,9 +375,8 @@ def _grown(
     seed: int,
     step: float,
 ) -> Grown:
-    numbers = [milestones] if neighbours is None else [milestones, neighbours]
-    if not all(isinstance(one, int | np.integer) and one >= 1 for one in numbers):
-        raise InvalidValue(f"milestones={milestones!r}, neighbours={neighbours!r}: give whole numbers, at least 1.")
+    milestones = checked_count("milestones", milestones, 1)
+    neighbours = None if neighbours is None else checked_count("neighbours", neighbours, 1)
     free, _ = _free(model, motors, model.robot.home if rest is None else rest, step)
     found = grown(kind, free, milestones, neighbours, seed)
     return Grown(free.whole(found.q), found.edges)

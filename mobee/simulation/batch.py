@@ -76,10 +76,8 @@ def run_batch(work: Callable[[int], T], seeds: Iterable[int], processes: int | N
     returns an object that can be pickled. `processes`: number of processes; None: one for each processor core; 1: in this process.
     Exceptions of `work` are raised here.
     """
-    if processes is not None and (isinstance(processes, bool) or not isinstance(processes, int) or processes < 1):
-        raise InvalidValue(f"processes={processes!r}: give a whole number from 1 on, or None for one per core.")
     given = list(seeds)
-    count = min(processes or _cores(), len(given))
+    count = min(_cores() if processes is None else checked_count("processes", processes, 1), len(given))
     if count <= 1:
         return [work(seed) for seed in given]
     with ProcessPoolExecutor(count, mp_context=get_context("spawn")) as pool:  # a fork could copy locks that are held by threads
@@ -106,6 +104,7 @@ class PlantBatch:
         self.plants = [OfflinePlant(model, settings=settings) for _ in range(checked_count("count", count))]
         """The plants; each may be used separately between two calls."""
         self._model, self._threads, self._core = model, checked_threads(threads), core.calls()
+        self._numbers = frozenset(range(len(self.plants)))
         self._addresses: Ints = np.array([plant.address for plant in self.plants], dtype=np.int64)
         self._deepest = np.zeros((count, core.RECORD_DEPTHS))
 
@@ -158,9 +157,11 @@ class PlantBatch:
         """Return the indices as an array; raises InvalidValue unless they are distinct indices of plants."""
         given = np.asarray(which)
         whole = given.ndim == 1 and (given.dtype.kind in "iu" or not given.size)
-        if not whole or not ((given >= 0) & (given < len(self.plants))).all() or len(set(given.tolist())) < len(given):
-            valid = f"it must be indices of plants, 0 to {len(self.plants) - 1}, each at most once"
-            raise InvalidValue(f"which is {' '.join(reprlib.repr(given).split())}; {valid}; use np.flatnonzero(mask) for a mask.")
+        numbers = set(given.tolist()) if whole else set()  # NumPy is slower for so few
+        if not whole or len(numbers) < len(given) or not numbers <= self._numbers:
+            valid = f"indices of plants, 0 to {len(self.plants) - 1}, each at most once" if self.plants else "empty, as there are no plants"
+            text = " ".join(reprlib.repr(given).split())
+            raise InvalidValue(f"which is {text}; it must be {valid}; use np.flatnonzero(mask) for a mask.")
         return given.astype(np.intp, copy=False)
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mobee.arrays import Array, checked_count, real_array
+from mobee.arrays import Array, checked_count, is_number, real_array
 from mobee.control import Controller, Gains
 from mobee.control.forces import Propagate, Term
 from mobee.control.law import Modality
@@ -115,9 +115,9 @@ class OfflinePlant:
         alive, dt = living(model.robot, chosen.active), chosen.dt
         law = {name: getattr(chosen, name) for name in ("modality", "propagate", "speed_scale", "contact_forces", "terms")}
         self._controller = Controller(model, chosen.gains, alive=alive, **law)
-        if not (isinstance(dt, int | float | np.number) and 0 < dt < self.controller.max_dt):
+        if not (is_number(dt) and 0 < dt < self.controller.max_dt):
             raise InvalidValue(f"tick of {dt!r} s: the gains need more than 0 and less than {self.controller.max_dt:.4g} s")
-        self.model, self.robot, self.dt = model, model.robot, dt
+        self.model, self.robot, self.dt = model, model.robot, float(dt)
         parameters = chosen.motors if chosen.motors is not None else MotorParameters()
         self.motors = Motors(self.robot, parameters, seed, self.robot.home, alive)
         self._options = {name: getattr(chosen, name) for name in _RECORDED}
@@ -126,7 +126,7 @@ class OfflinePlant:
             self._options["terms"] = [term.name for term in chosen.terms]
         self._actions = Actions(self.robot, alive)
         self._touching, self._moved = engine_of(without_pairs(self.robot)), links_moved(self.robot)
-        self._runner = Runner(self._controller, self.motors, alive, dt, chosen.command_age, self._actions.parts)
+        self._runner = Runner(self._controller, self.motors, alive, self.dt, chosen.command_age, self._actions.parts)
         self._alive = alive
         self._pose: Pose | None = None
         self._hashed = chosen.hashed
@@ -316,9 +316,7 @@ class OfflinePlant:
 
         The callback may change the world. A new callback replaces the present one.
         """
-        if isinstance(ticks, bool) or not isinstance(ticks, int) or ticks < 1:
-            raise InvalidValue(f"every {ticks!r} ticks: must be a whole number, at least 1")
-        self._period, self._callback = ticks, callback
+        self._period, self._callback = checked_count("ticks", ticks, 1), callback
 
     def advance(self) -> list[tuple[str, Outcome]]:
         """Run until at least one acting part has ended; return the names and outcomes of the parts that ended, in the robot's order.

@@ -169,9 +169,12 @@ class ReachLearner:
     def _checked_rewards(self, given: Any) -> Array:
         """Return the rewards that the strategy gave; raises InvalidValue unless they are a number for each state, -inf for no reach."""
         rewards = real_array(f"the rewards of the strategy {self._strategy_name!r}", given)
-        if rewards.shape != (len(self.space),) or not (rewards < np.inf).all() or not (rewards > -np.inf).any():
+        wrong = int((~(rewards < np.inf)).sum())
+        if rewards.shape != (len(self.space),) or wrong or not (rewards > -np.inf).any():
+            given = f"{wrong} of which are NaN or infinite" if wrong else "none of which is finite"
+            about = f"of shape {rewards.shape}" if rewards.shape != (len(self.space),) else given
             raise InvalidValue(
-                f"strategy {self._strategy_name!r} returned rewards of shape {rewards.shape}: give one for each state, "
+                f"strategy {self._strategy_name!r} returned rewards {about}: give one for each state, "
                 f"shape ({len(self.space)},), finite, or -inf where no reach is allowed."
             )
         return rewards

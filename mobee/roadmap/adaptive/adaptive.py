@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mobee.arrays import Array, Ints, real_array
+from mobee.arrays import Array, Ints, checked_count, real_array
 from mobee.errors import InvalidValue, MobeeError, UnknownName
 from mobee.learning.goal import target_states
 from mobee.learning.neighbours import NO_ACTION, Edges, edges_of, joined, table_of
@@ -180,9 +180,7 @@ class AdaptiveRoadmap:
         Each new vertex gets edges to and from its `neighbours` nearest vertices, at least 1. For this distance, each joint's difference is
         divided by the joint's range. Raises InvalidValue for samples beyond the joints' limits.
         """
-        if not isinstance(neighbours, int | np.integer) or neighbours < 1:
-            raise InvalidValue(f"neighbours={neighbours!r}: give a whole number, at least 1.")
-        new = self._new(samples)
+        neighbours, new = checked_count("neighbours", neighbours, 1), self._new(samples)
         poses, old = np.concatenate([self.space.samples, new]), len(self)
         spans = np.ptp(self.space.robot.limits[[self.space.robot.motor_index(joint) for joint in self.space.joints]], axis=1)
         edges = []

@@ -10,7 +10,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mobee.arrays import Array, real_array
+from mobee.arrays import Array, checked_count, real_array
 from mobee.errors import InvalidValue, UnknownName
 
 
@@ -177,9 +177,7 @@ class NES:
         if method not in METHODS:
             raise UnknownName("method", method, METHODS)
         d = len(mean)
-        size = default_population(d) if population is None else population
-        if isinstance(size, bool) or not isinstance(size, int | np.integer) or size < 4:
-            raise InvalidValue(f"population {population!r}: must be a whole number of at least 4, or None.")
+        size = default_population(d) if population is None else checked_count("population", population, 4)
         self.mean = mean
         self.sigma = 1.0  # in units of the std at the start
         self.shape = np.ones(d) if method in ("separable", "snes") else np.eye(d)

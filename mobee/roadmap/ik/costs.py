@@ -58,8 +58,9 @@ def lengths(vectors: Array) -> Array:
 
 
 def finite(name: str, given: float) -> float:
-    """Return the number `given`; raise InvalidValue, with `name` in its text, if it is not finite."""
-    if not np.isfinite(given):
+    """Return the number `given`; raise InvalidValue, with `name` in its text, if it is not one finite number."""
+    number = real_array(name, given)
+    if number.size != 1 or not np.isfinite(number).all():
         raise InvalidValue(f"{name} is {given!r}; it must be a finite number.")
     return given
 

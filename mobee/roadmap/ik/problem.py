@@ -149,7 +149,7 @@ class Problem:
 def require_list(costs: object) -> None:
     """Raise InvalidValue unless the costs are a sequence, and not one term alone."""
     if isinstance(costs, Term) or not isinstance(costs, Sequence):
-        raise InvalidValue(f"costs is {costs!r}; it must be a list of terms.")
+        raise InvalidValue(f"costs is of type {type(costs).__name__}; give a list of terms, as list(costs) or [term].")
 
 
 def _within(limits: Array, margin: float, units: Array) -> Array:

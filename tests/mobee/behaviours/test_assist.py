@@ -96,7 +96,12 @@ def test_an_invalid_posture_or_target_is_refused(assist: Assist, change: dict[st
         assist.posture(**{"q": ROBOT.home, "target": FAR} | change)
 
 
-@pytest.mark.parametrize("levels", [-1, 0, 1, 2.0])
+def test_a_number_of_levels_may_be_of_numpy() -> None:
+    assist = Assist(Model(ROBOT), "torso", "right_arm", lambda places: places[:, 0], levels=np.int64(3))  # type: ignore[arg-type]
+    assert len(assist._postures) == 27
+
+
+@pytest.mark.parametrize("levels", [-1, 0, 1, 2.0, True])
 def test_a_number_of_levels_is_whole(levels: int) -> None:
     with pytest.raises(InvalidValue, match="levels=.*2 or more"):
         Assist(Model(ROBOT), "torso", "right_arm", lambda places: places[:, 0], levels=levels)

@@ -188,7 +188,7 @@ def test_a_measurement_that_is_not_finite_is_refused_and_bumps_are_still_detecte
 def test_a_watch_that_could_never_detect_a_bump_is_refused() -> None:
     with pytest.raises(mobee.InvalidValue, match="none is named"):
         BumpWatch(robot(), [])
-    for threshold in (0.0, -1.0, np.nan, np.inf):
+    for threshold in (0.0, -1.0, np.nan, np.inf, "a", None):
         with pytest.raises(mobee.InvalidValue, match="threshold"):
             BumpWatch(robot(), WATCHED, threshold)
 

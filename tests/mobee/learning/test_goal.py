@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+import json
+from fractions import Fraction
+
 import numpy as np
 import pytest
 
@@ -36,6 +39,13 @@ def test_an_external_reward_replaces_the_intrinsic_one_or_is_added_to_it():
     added = External(SPACE, [3], weight=0.1).combined(intrinsic)
     assert added[3, 0] == pytest.approx(0.6) and added[4, 0] == 0.5
     assert np.array_equal(added == -np.inf, ~EXISTS)
+
+
+@pytest.mark.parametrize("weight", [np.float32(0.5), np.int64(1), Fraction(1, 2)])
+def test_a_weight_may_be_any_real_number_and_is_recorded_as_a_float(weight):
+    external = External(SPACE, [3], weight)
+    assert external.combined(np.where(EXISTS, 0.5, -np.inf)).dtype == np.float64
+    assert json.loads(json.dumps(external.settings))["weight"] == float(weight)
 
 
 def test_an_agent_with_a_goal_goes_there_and_stays_near():

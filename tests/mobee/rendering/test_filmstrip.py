@@ -144,6 +144,8 @@ def test_a_cloud_is_written_and_needs_one_value_per_pose(model: mobee.Model, tmp
     pytest.importorskip("matplotlib")
     q = np.tile(model.robot.home, (4, 1))
     assert marker_cloud(model, q, PALM, tmp_path / "cloud.png", views=("top",), height=30).stat().st_size > 0
+    angles = np.array([[0.0, 10.0], [90.0, 0.0]])
+    assert marker_cloud(model, q, PALM, tmp_path / "cloud.png", views=angles, height=30).stat().st_size > 0  # type: ignore[arg-type]
     with pytest.raises(InvalidValue, match="one value per pose"):
         marker_cloud(model, q, PALM, tmp_path / "cloud.png", values=[1.0])
     with pytest.raises(InvalidValue, match="1 of 4 are not finite"):
@@ -157,6 +159,8 @@ def test_mistakes_are_refused(motion: Motion, tmp_path: Path) -> None:
         panels(Strip(motion, PALM, poses=0), 40)
     with pytest.raises(UnknownName):
         panels(Strip(motion, "rigth_palm"), 40)
+    with pytest.raises(InvalidValue, match="view .*must be an array of numbers"):
+        panels(Strip(motion, PALM, views=(("a", "b"),)), 40)  # type: ignore[arg-type]
     with pytest.raises(InvalidValue, match="height 0"):
         panels(Strip(motion, PALM), 0)
     with pytest.raises(InvalidValue, match="two finite numbers"):

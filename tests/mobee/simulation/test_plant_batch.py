@@ -126,6 +126,8 @@ def test_plants_are_chosen_by_distinct_indices(which: Any) -> None:
     with pytest.raises(InvalidValue, match="which .*indices of plants, 0 to 2, each at most once"):
         batch.run(which, 1)
     assert [plant.time for plant in batch.plants] == [0.0, 0.0, 0.0]
+    with pytest.raises(InvalidValue, match="it must be empty, as there are no plants"):
+        PlantBatch(Model(ICUB), 0, SETTINGS).run(np.array([0]), 1)
 
 
 @pytest.mark.parametrize("ticks", [-1, 1.5, True, "a"])
