@@ -172,7 +172,7 @@ def _comment(robot: Robot) -> str:
 
 def _write_body(robot: Robot, link: ET.Element, index: int, point: Array, part: str, writer: GeometryWriter) -> None:
     link.extend(inertial_element(body, point) for body in robot.bodies if body.link == index)
-    balls = {(shape.link, shape.size[0]) for shape in robot.shapes if shape.kind == "sphere"}
+    balls = {(shape.link, shape.size[0]) for shape in robot.shapes if shape.kind in ("sphere", "capsule")}
     for k, shape in enumerate(robot.shapes):
         if shape.link != index:
             continue

@@ -73,6 +73,18 @@ def test_capsules_that_meet_and_cylinders_with_spheres_remain_what_they_are(tmp_
     assert_same_robot(robot, read_back(robot, tmp_path))
 
 
+def test_a_cylinder_between_two_capsules_remains_one(tmp_path: Path) -> None:
+    path = robot_file(
+        tmp_path,
+        '<bodypart name="arm"><motor name="pan" minPos="-90" maxPos="90"><joint z="1">',
+        '<capsule name="a" radius="0.05" height="0.2" py="-0.1"/><cylinder name="c" radius="0.05" height="0.2" py="0.1"/>',
+        '<capsule name="b" radius="0.05" height="0.2" py="0.3"/></joint></motor></bodypart>',
+    )
+    robot = load_robot(path)
+    assert [shape.kind for shape in robot.shapes] == ["capsule", "cylinder", "capsule"]
+    assert_same_robot(robot, read_back(robot, tmp_path))
+
+
 def test_shapes_outside_of_every_part_remain_there(tmp_path: Path) -> None:
     path = robot_file(
         tmp_path,
