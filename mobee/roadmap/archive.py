@@ -6,9 +6,9 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import os
 import zipfile
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from io import BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -19,6 +19,7 @@ from mobee.errors import MobeeError
 from mobee.model.world import World
 from mobee.model.world_object import FRICTION, Geometry, WorldObject
 from mobee.robot.robot import Robot, Shape, per_robot
+from mobee.robot.writing import write_whole
 
 _DIGITS, _DECIMALS = 16, 9
 
@@ -129,20 +130,15 @@ Arrays = dict[str, NDArray[Any]]
 def write(path: str | Path, arrays: Mapping[str, NDArray[Any]], notes: Mapping[str, Any]) -> None:
     """Write named arrays of numbers and `notes`, plain JSON values, to a roadmap file.
 
-    After a crash the file is either complete or unchanged. Raises MobeeError if the file cannot be written.
+    After a crash the file is either complete or unchanged. A symbolic link stays one: its target is replaced. Raises MobeeError if the file
+    cannot be written.
     """
     place = Path(path)
-    part = place.with_name(f".{place.name}.{os.getpid()}.part")
     text = json.dumps({"format": FORMAT, **notes}, allow_nan=False)
+    content = BytesIO()
+    np.savez(content, allow_pickle=False, notes=np.frombuffer(text.encode(), dtype=np.uint8), **arrays)
     try:
-        try:
-            with part.open("wb") as file:
-                np.savez(file, allow_pickle=False, notes=np.frombuffer(text.encode(), dtype=np.uint8), **arrays)
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(part, place)
-        finally:
-            part.unlink(missing_ok=True)
+        write_whole(place, content.getvalue())
     except OSError as error:
         raise MobeeError(f"{place}: the map cannot be written ({error.strerror or error}).") from error
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import mobee
-from mobee.roadmap.archive import read, robot_digest, world_as_json, world_digest, world_from_json
+from mobee.roadmap.archive import read, robot_digest, world_as_json, world_digest, world_from_json, write
 
 
 def test_a_robot_read_again_under_another_name_is_the_same(icub: mobee.Robot) -> None:
@@ -54,6 +54,16 @@ def test_attaching_an_object_changes_the_world_s_digest() -> None:
         world.add("cup", mobee.sphere(0.03))
     carried.attach("cup", "l_hand", (np.zeros(3), np.eye(3)))
     assert world_digest(free) != world_digest(carried)
+
+
+def test_a_map_that_is_written_anew_keeps_its_mode_and_the_links_to_it(tmp_path: Path) -> None:
+    (tmp_path / "maps").mkdir()
+    target, link = tmp_path / "maps" / "map.npz", tmp_path / "map.npz"
+    target.touch(0o600)
+    link.symlink_to(target)
+    write(link, {"q": np.zeros(3)}, {})
+    assert link.is_symlink() and target.stat().st_mode & 0o777 == 0o600
+    assert read(target)[0]["q"].tolist() == [0.0] * 3
 
 
 def test_mass_and_friction_of_objects_are_kept_and_may_be_absent() -> None:

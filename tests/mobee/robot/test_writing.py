@@ -27,6 +27,15 @@ def test_a_link_to_a_file_that_is_not_there_makes_the_file(tmp_path: Path) -> No
     assert link.is_symlink() and (tmp_path / "new.xml").read_bytes() == b"new"
 
 
+@pytest.mark.parametrize("name", ["file/arm.xml", f"{'a' * 300}.xml"])
+def test_an_error_of_a_parent_that_is_a_file_or_of_a_long_name_names_the_given_path(tmp_path: Path, name: str) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OSError, match=name) as caught:
+        write_whole(tmp_path / name, b"new")
+    assert caught.value.filename == str(tmp_path / name)
+    assert list(tmp_path.iterdir()) == [tmp_path / "file"]
+
+
 def test_an_error_names_the_given_path_and_leaves_nothing(tmp_path: Path) -> None:
     folder = tmp_path / "folder.xml"
     folder.mkdir()
