@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mobee.arrays import Array, checked_threads, real_array
+from mobee.arrays import Array, checked_threads, is_number, real_array
 from mobee.errors import InvalidValue, UnknownName
 from mobee.model.engine import EMPTY, MAX_HANDS, NO_HANDS, Hand, Hands, Neighbours
 from mobee.model.engine import Engine as NativeEngine
@@ -48,7 +48,7 @@ class Model:
 
     def __reduce__(self) -> tuple[type[Model], tuple[Robot, World, str]]:
         """Copy or pickle the robot and the world; `copy.copy` makes a model in the same world, `copy.deepcopy` one in a copy of it."""
-        return Model, (self.robot, self.world, "compiled" if isinstance(self._engine, NativeEngine) else "fcl")
+        return type(self), (self.robot, self.world, "compiled" if isinstance(self._engine, NativeEngine) else "fcl")
 
     def hands(self, reaching: Reaching) -> Hands:
         """Return a tuple with the hand of each marker that reaches, in the order given: the links whose contacts with targets are ignored.
@@ -115,7 +115,7 @@ class Model:
         one = self._one_pose(q)
         value: Array | bytes = self._checked(q) if one is None else one
         if threads != 1:  # the usual case is not checked
-            checked_threads(threads)
+            threads = checked_threads(threads)
         return Pose(self.robot, self._engine, value, self.world.snapshot, NO_HANDS if reaching is None else self.hands(reaching), threads)
 
     def track(self, skin: float = 0.02) -> Track:
@@ -124,7 +124,7 @@ class Model:
         `skin`: m; the evaluator keeps a list of the pairs of volumes that are nearer than this. The engine "fcl" has no such list and
         evaluates every pair. Raises InvalidValue unless the skin is finite and above 0.
         """
-        if not (isinstance(skin, int | float | np.number) and 0.0 < skin < math.inf):
+        if not (is_number(skin) and 0.0 < skin < math.inf):
             raise InvalidValue(f"skin {skin!r} m: must be a finite distance above 0")
         return Track(self, self._engine, skin)
 

@@ -60,9 +60,9 @@ class World:
         self._snapshot = EMPTY
         self._followed: LinkPoses | None = None
 
-    def __reduce__(self) -> tuple[Callable[..., World], tuple[tuple[WorldObject, ...]]]:
+    def __reduce__(self) -> tuple[Callable[..., World], tuple[type[World], tuple[WorldObject, ...]]]:
         """Copy or pickle the objects; a copy does not know the present pose of the robot (see `follow`)."""
-        return _world_of, (tuple(self._snapshot.objects.values()),)
+        return _world_of, (type(self), tuple(self._snapshot.objects.values()))
 
     @property
     def snapshot(self) -> Snapshot:
@@ -179,8 +179,8 @@ class World:
         return self._snapshot.objects[name]
 
 
-def _world_of(objects: tuple[WorldObject, ...]) -> World:
-    world = World()
+def _world_of(kind: type[World], objects: tuple[WorldObject, ...]) -> World:
+    world = kind()
     for thing in objects:
         world._snapshot = extended(world._snapshot, replace(thing))  # replaced, so that arrays that were pickled are protected again
     return world

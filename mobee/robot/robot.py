@@ -8,10 +8,10 @@ when it is drawn.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property, wraps
 from pathlib import Path
-from typing import Literal, TypeVar
+from typing import Any, Literal, TypeVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -244,6 +244,10 @@ class Robot:
     visuals: tuple[Visual, ...] = ()
     cameras: Mapping[str, Camera] = field(default_factory=dict)
     least_lever: float = 0.0
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Copy or pickle the fields alone; the arrays that are computed from them would no longer be read-only."""
+        return {one.name: getattr(self, one.name) for one in fields(self)}
 
     @cached_property
     def motors(self) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ import pytest
 
 import mobee
 from mobee.model.world_object import Geometry, WorldObject
+from tests.mobee.planar import planar_arm
 
 HALF_TURN = np.diag([-1.0, -1.0, 1.0])
 
@@ -147,6 +148,14 @@ def test_a_place_that_is_refused_leaves_the_object_where_it_was(world):
     assert np.array_equal(world.objects["cup"].position, [0.1, 0.2, 0.3])
 
 
+class OwnWorld(mobee.World):
+    pass
+
+
+class OwnModel(mobee.Model):
+    pass
+
+
 def test_an_object_copies_the_arrays_that_it_is_made_of():
     position, rotation = np.zeros(3), np.eye(3)
     thing = WorldObject("cup", "sphere", (0.1,), position, rotation)
@@ -154,9 +163,20 @@ def test_an_object_copies_the_arrays_that_it_is_made_of():
     assert not thing.position.any() and np.array_equal(thing.rotation, np.eye(3))
 
 
-@pytest.mark.parametrize(
+COPIES = pytest.mark.parametrize(
     "copied", [copy.copy, copy.deepcopy, lambda one: pickle.loads(pickle.dumps(one))], ids=["copy", "deepcopy", "pickle"]
 )
+
+
+@COPIES
+def test_a_copy_of_a_subclass_is_one_too(copied):
+    world = OwnWorld()
+    world.add("ball", mobee.sphere(0.1))
+    assert type(copied(world)) is OwnWorld and list(copied(world).objects) == ["ball"]
+    assert type(copied(OwnModel(planar_arm()))) is OwnModel
+
+
+@COPIES
 def test_a_copy_is_a_world_of_its_own(world, copied):
     world.attach("cup", "hand", ((0.0, 0.0, 0.1), np.eye(3)))
     world.add("ball", mobee.sphere(0.1), role="target", mass=0.2)
