@@ -100,6 +100,11 @@ class ReachAgent(ReachLearner):
             self._state = self.space.state_of(self.plant.measure(self.part))
         return self._state
 
+    def begin(self, target: ReachTarget) -> None:
+        """Start a problem-try, or continue it, as `ReachLearner.begin`; first learn a step whose write was interrupted."""
+        self._catch_up()
+        super().begin(target)
+
     def try_problem(self, target: ReachTarget) -> Try:
         """Make one problem-try (attempt to reach one target) and return it: move to a state by a plan, then reach (thesis 8.3.1).
 
@@ -107,7 +112,6 @@ class ReachAgent(ReachLearner):
         ActionInterrupted if the plant does; the problem-try then stays under way, and the next call for a target at the same position
         continues it.
         """
-        self._catch_up()
         self.begin(target)
         self.plant.present(target)
         while self.under_way is not None:

@@ -248,11 +248,20 @@ class Returning(Fixed):
 
 
 @pytest.mark.parametrize(
-    "worth", [[0.5, 0.5, 0.5], [[0.5]] * 4, [0.5, np.nan, 0.5, 0.5], [np.inf, 0.5, 0.5, 0.5], [-np.inf] * 4, ["much"] * 4, None]
+    ("worth", "said"),
+    [
+        ([0.5, 0.5, 0.5], r"of shape \(3,\)"),
+        ([[0.5]] * 4, r"of shape \(4, 1\)"),
+        ([0.5, np.nan, 0.5, 0.5], "1 of which are NaN or infinite"),
+        ([np.inf, 0.5, 0.5, 0.5], "1 of which are NaN or infinite"),
+        ([-np.inf] * 4, "none of which is finite"),
+        (["much"] * 4, "array of numbers"),
+        (None, "array of numbers"),
+    ],
 )
-def test_rewards_that_are_no_number_for_each_state_are_refused_before_the_robot_moves(worth):
+def test_rewards_that_are_no_number_for_each_state_are_refused_before_the_robot_moves(worth, said):
     reacher = corridor(strategy=lambda reaches, predictor: Returning(worth))
-    with pytest.raises(InvalidValue, match="strategy"):
+    with pytest.raises(InvalidValue, match=f"strategy.*{said}"):
         reacher.learn([GOAL], 1)
     assert reacher.steps == 0
 
@@ -296,6 +305,29 @@ def test_an_interrupted_write_is_learnt_if_it_is_on_disk(tmp_path, counted, monk
         whole.learn([GOAL], reacher.tries)
         assert len(written) == 4 and store.load()[0] == written[0]
         assert len(store.load()) == reacher.steps == whole.steps and reacher.last == whole.last
+
+
+def test_an_interrupted_write_is_learnt_before_another_target_begins(tmp_path, monkeypatch):
+    with ReachStore(tmp_path / "steps.sqlite", "left_arm") as store:
+        reacher = corridor(store=store)
+        append = store.append
+
+        def interrupted(step, targets):
+            append(step, targets)
+            raise KeyboardInterrupt
+
+        reacher.begin(GOAL)
+        reacher.plant.present(GOAL)
+        monkeypatch.setattr(store, "append", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            reacher.step()
+        monkeypatch.undo()
+        other = ReachTarget(np.array([0.1, 0.0, 0.0]))
+        reacher.begin(other)
+        assert reacher.steps == 1 and reacher.problems.tries == [1, 0]
+        reacher.plant.present(other)
+        reacher.step()
+        assert [(step.n, step.problem) for step in store.load()] == [(1, 0), (2, 1)]
 
 
 def test_a_try_left_for_another_problem_has_ended():
