@@ -42,6 +42,8 @@ class DiscreteSpace(Space):
         InvalidValue: an argument is out of its range; the message states the valid one.
     """
 
+    only_postures = False
+
     def __init__(self, states: int, actions: int, goals: ArrayLike | None = None, name: str = "environment") -> None:
         if not 2 <= states <= MAX_STATES or actions < 1:
             raise InvalidValue(f"{states} states and {actions} actions: give 2 to {MAX_STATES} states, and 1 or more actions.")

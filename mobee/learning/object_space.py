@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mobee.arrays import Array, Ints, real_array
+from mobee.arrays import Array, Ints, is_number, real_array
 from mobee.errors import InvalidValue, MobeeError
 from mobee.learning.neighbours import NO_ACTION
 from mobee.learning.space import MAX_STATES, Space
@@ -35,6 +35,8 @@ class ObjectSpace(Space):
     Raises:
         InvalidValue: there are too many states, and the message states the largest number; or `postures` is an `ObjectSpace`.
     """
+
+    only_postures = False
 
     def __init__(self, postures: Space, grid: Grid, name: str) -> None:
         if isinstance(postures, ObjectSpace):
@@ -132,7 +134,7 @@ class Grid:
         low, high = ranges.T
         self.shape: tuple[int, int] = (int(sizes[0]), int(sizes[1]))
         self._low, self._size = low, (high - low) / sizes
-        if not (isinstance(margin, int | float | np.number) and 0.0 <= margin < 0.5 * self._size.min()):
+        if not (is_number(margin) and 0.0 <= margin < 0.5 * self._size.min()):
             raise InvalidValue(f"margin={margin!r} m: give 0 or more, below {0.5 * self._size.min():.4g} m, half of a cell.")
         self.margin = float(margin)
         self._range = (tuple(map(float, x)), tuple(map(float, y)))

@@ -53,6 +53,9 @@ class Space:
         InvalidValue, UnknownName: an argument is out of its range or unknown; the message states the valid ones.
     """
 
+    only_postures = True
+    """Whether a state is determined by the posture of the part alone, and an action by its goal state."""
+
     def __init__(
         self, robot: Robot, joints: Sequence[str], samples: ArrayLike, goals: ArrayLike, rest: float | Sequence[float] = 0.5
     ) -> None:
@@ -290,7 +293,7 @@ def with_shortcuts(space: Space, transitions: Sequence[Transition], count: int, 
 
 def _require_poses(space: Space) -> None:
     """Raise InvalidValue for an `ObjectSpace` or a `DiscreteSpace`: a `Space` has only samples and goals, and would lose the rest."""
-    if type(space).state_after is not Space.state_after or type(space).aim is not Space.aim:
+    if not space.only_postures:
         raise InvalidValue(f"{space}: its states are not poses alone, so it cannot be adapted; of an ObjectSpace give `space.postures`.")
 
 

@@ -41,6 +41,16 @@ def test_a_state_that_was_aimed_at_in_vain_is_pruned_with_the_actions_to_it():
     assert len(pruned(space(), [*walked(0, 1, 2), *failed(2, 3, 4)])[0]) == 5
 
 
+class Rounded(Space):
+    def aim(self, state, action):
+        return super().aim(state, action).round(6)
+
+
+def test_a_subclass_whose_states_are_poses_alone_is_adapted():
+    given = Rounded(toy_robot(), ["l_elbow"], SAMPLES, RING)
+    assert len(pruned(given, walked(0, 1, 2))[0]) == len(with_shortcuts(given, walked(0, 1, 2), 1)) == 5
+
+
 def test_what_was_reached_once_stays():
     assert len(pruned(space(), [*walked(2, 3, 2), *failed(2, 3, 50)])[0]) == 5
 
