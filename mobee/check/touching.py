@@ -274,12 +274,12 @@ LONG = 0.15  # m: the shoulder, wrist or hand of a large robot is shorter
 
 
 def long_clusters(subject: Subject) -> Iterator[Finding]:
-    """Yield a finding for each long cluster of joints: its outer links can touch, but are not tested (`mobee.robot.pairs`)."""
+    """Yield a finding for each long cluster of joints: the links that its first and last joint move are not tested."""
     robot, joints = subject.robot, subject.robot.joints
     for cluster in joint_clusters(joints):
         points = np.array([joints[k].point for k in cluster])
         span = float(np.linalg.norm(points[:, None] - points, axis=2).max())
-        outer = frozenset((joints[cluster[0]].parent, cluster[-1] + 1))
+        outer = frozenset((cluster[0] + 1, cluster[-1] + 1))
         if span > LONG and robot.untested.get(outer, "").startswith(CLUSTER_REASON):
             yield Finding(
                 "warning",

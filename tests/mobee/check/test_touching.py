@@ -12,6 +12,7 @@ from mobee.check.touching import touching_pairs
 from mobee.errors import InvalidValue
 from mobee.model import World, sphere
 from mobee.model.model import Model
+from mobee.robot.join import join_robots
 from mobee.robot.load import load_robot
 from mobee.robot.xml.write import write_xml
 from tests.mobee.check.arm import arm, named
@@ -40,6 +41,15 @@ def test_a_chain_of_short_links_that_are_not_tested_is_found(tmp_path: Path, ste
     again = load_robot(tmp_path / "listed.xml")
     assert Model(again).evaluate(curled).contacts
     assert [finding for finding in check_robot(again) if finding.check == "long-cluster"] == []
+
+
+def test_a_long_cluster_at_the_base_is_found_alone_and_in_joined_robots(tmp_path: Path) -> None:
+    head = [f'<motor name="m{k}" minPos="-90" maxPos="90"><joint y="1"><link z="0.03" radius="0.01">' for k in range(7)]
+    alone = load_robot(robot_file(tmp_path, '<bodypart name="arm">', *head, *["</link></joint></motor>"] * 7, "</bodypart>"))
+    joined = join_robots({"": alone, "b": alone}, {"b": (np.array([1.0, 0.0, 0.0]), np.eye(3))})
+    for robot, count in ((alone, 1), (joined, 2)):
+        found = [finding.what for finding in check_robot(robot) if finding.check == "long-cluster"]
+        assert len(found) == count and all("7 joints from " in one for one in found)
 
 
 @pytest.mark.parametrize(("home", "found"), [("10", 1), ("60", 0)])
