@@ -32,8 +32,8 @@ def in_metres(robot: Robot, motor: Motor) -> bool:
 
 
 def unit_name(robot: Robot, motor: Motor) -> str:
-    """Return the name of the unit of the motor's position: "m" for a motor that slides, "rad" for all others."""
-    return "m" if slides(robot, motor) else "rad"
+    """Return the name of the unit of the motor's position: "m" if it is in metres (`in_metres`), else "rad"."""
+    return "m" if in_metres(robot, motor) else "rad"
 
 
 def angle_unit(limits: Array, sliding: bool) -> float:

@@ -2,14 +2,28 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from mobee.robot.load import load_robot, shipped_robots
-from mobee.robot.motor_units import FINE, LIMIT_WIDTH, SLIDE_RANGE, angle_unit, fine_units, limit_zones, motor_units, outside_zones
+from mobee.robot.motor_units import (
+    FINE,
+    LIMIT_WIDTH,
+    SLIDE_RANGE,
+    angle_unit,
+    fine_units,
+    limit_zones,
+    motor_units,
+    outside_zones,
+    unit_name,
+)
 from mobee.robot.robot import Robot
+from mobee.robot.xml.write import write_xml
 from tests.mobee.planar import planar_arm
+from tests.mobee.robot.robot_files import robot_file
+from tests.mobee.robot.same_robot import assert_same_robot
 
 
 def sliding(*limits: tuple[float, float]) -> Robot:
@@ -31,6 +45,15 @@ def test_a_motor_that_also_turns_something_counts_in_radians() -> None:
     robot = sliding((0.0, 0.04), (0.0, 0.04), (0.0, 0.04))
     mixed = replace(robot, joints=(replace(robot.joints[0], kind="revolute"), *robot.joints[1:]))
     assert motor_units(mixed)[0] == 1.0
+
+
+@pytest.mark.parametrize(("unit", "end", "name"), [("deg", "90", "rad"), ("m", "0.2", "m"), ("m", "0.1", None)])
+def test_a_motor_is_in_metres_if_its_slide_moves_as_far_as_it_does(tmp_path: Path, unit: str, end: str, name: str | None) -> None:
+    joint = '<joint type="prismatic" z="1" minPos="0" maxPos="0.2"/>'
+    motor = f'<motor name="lift" unit="{unit}" minPos="0" maxPos="{end}">{joint}</motor>'
+    robot = load_robot(robot_file(tmp_path, f'<bodypart name="arm">{motor}</bodypart>'))
+    assert name in (None, unit_name(robot, robot.motor_table[0]))
+    assert_same_robot(robot, load_robot(write_xml(robot, tmp_path / "written.xml")))
 
 
 def test_the_zone_of_a_slide_is_five_percent_of_its_range() -> None:
