@@ -101,7 +101,7 @@ def view(
     with tempfile.TemporaryDirectory(prefix="mobee-view-") as private:
         file = Path(private) / "view.rrd" if save is None else save
         stream = rr.RecordingStream("mobee")
-        kept = stream.memory_recording()  # Rerun's own writer of files waits for ever, or reports nothing, if the disk is full
+        kept = stream.memory_recording()  # Rerun's own writer of files never ends, or reports nothing, if the disk is full
         stream.send_blueprint(layout(robot), make_active=False, make_default=True)
         _log(stream, robot, world, sweep(robot) if stretches is None else stretches, solids)
         write_whole(file, kept.drain_as_bytes())
