@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from mobee._core import Table, address, numbers, view
 from mobee._core import plant as core
-from mobee.arrays import Array, Ints, checked_seed, real_array
+from mobee.arrays import Array, Ints, checked_seed, is_number, real_array
 from mobee.errors import InvalidValue
 from mobee.model.masses import gravity_torque
 from mobee.robot.motor_units import fine_units
@@ -54,8 +54,9 @@ class MotorParameters:
             if value.ndim > (name != "encoder_noise") or not np.all((value >= 0.0) & (value < np.inf)):
                 raise InvalidValue(f"motor {name} {getattr(self, name)}: must be finite and not negative")
             object.__setattr__(self, name, float(value) if value.ndim == 0 else tuple(value.tolist()))  # so that it can be compared
-        if not (isinstance(self.substep, int | float | np.number) and 0 < self.substep < np.inf):
+        if not (is_number(self.substep) and 0 < self.substep < np.inf):
             raise InvalidValue(f"motor substep {self.substep!r} s: must be a finite time above 0")
+        object.__setattr__(self, "substep", float(self.substep))
 
     @classmethod
     def ideal(cls) -> MotorParameters:

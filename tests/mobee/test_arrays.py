@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
 import pytest
 
 import mobee
-from mobee.arrays import real_array
+from mobee.arrays import checked_count, checked_threads, is_number, real_array
 from mobee.model.masses import gravity_torque, potential_energy
 from mobee.roadmap.playback import timed
 
@@ -33,6 +34,35 @@ def test_an_argument_that_is_no_array_of_numbers_is_refused(given: Any) -> None:
 def test_complex_numbers_are_refused_even_without_an_imaginary_part(given: Any) -> None:
     with pytest.raises(mobee.InvalidValue, match="q is complex, .* first; it must be real numbers"):
         real_array("q", given)
+
+
+@pytest.mark.parametrize("value", [1, 0.5, np.float32(0.5), np.int64(1), Fraction(1, 2), np.nan])
+def test_real_numbers_of_all_types_are_numbers(value: Any) -> None:
+    assert is_number(value)
+
+
+@pytest.mark.parametrize("value", ["1", None, 1j, np.complex128(1.0), [1.0], np.ones(1)])
+def test_other_values_are_no_numbers(value: Any) -> None:
+    assert not is_number(value)
+
+
+@pytest.mark.parametrize("value", [True, 2, -1, 3.0, "3", None])
+def test_a_count_is_a_whole_number_from_the_least_on(value: Any) -> None:
+    with pytest.raises(mobee.InvalidValue, match=f"n={value!r}: give a whole number, 3 or more"):
+        checked_count("n", value, 3)
+
+
+def test_counts_and_threads_of_numpy_become_ints() -> None:
+    for found in (checked_count("n", np.int64(3), 3), checked_threads(np.int32(3))):  # type: ignore[arg-type]
+        assert type(found) is int and found == 3
+
+
+def test_times_may_be_fractions() -> None:
+    model = mobee.Model(mobee.load_robot("katana"))
+    motors = mobee.MotorParameters(substep=Fraction(1, 200))  # type: ignore[arg-type]
+    plant, same = (mobee.OfflinePlant(model, seed=0, motors=motors, dt=dt) for dt in (Fraction(1, 50), 0.02))  # type: ignore[arg-type]
+    part = next(iter(model.robot.parts))
+    assert plant.act(part, plant.measure(part)).q.tolist() == same.act(part, same.measure(part)).q.tolist()
 
 
 def test_a_complex_q_is_refused_wherever_a_pose_is_taken() -> None:
