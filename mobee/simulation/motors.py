@@ -181,17 +181,10 @@ class Motors:
         self._lag, self._delay = parameters.of_robot("lag", robot), parameters.of_robot("delay", robot)
         self._line = np.zeros((1, n))
         self._noise_samples = np.empty((len(self.living), 4))
-        self.struct = core.Motors(
-            view(self.living),
-            view(self.constants),
-            address(self.state),
-            address(self._line),
-            1,
-            0,
-            self.seed,
-            address(self._noise_samples),
-            -1,
-        )
+        self.struct = core.Motors(  # `begin_substeps` sets the delay line
+            living=view(self.living), constants=view(self.constants), state=address(self.state),
+            seed=self.seed, noise_samples=address(self._noise_samples), noise_tick=-1,
+        )  # fmt: skip
         """The motors as the compiled core reads them."""
         self.address = ctypes.addressof(self.struct)
         self._core = core.calls()
@@ -322,7 +315,7 @@ class Motors:
             return
         self._dt = dt
         with np.errstate(divide="ignore"):
-            self.constants["response"] = np.where(self._lag > 0.0, 1.0 - np.exp(-dt / self._lag), 1.0)
+            self.constants["response"] = 1.0 - np.exp(-dt / self._lag)  # 1 without a lag
         before, delay = self.constants["delay"].copy(), np.round(self._delay / dt).astype(np.int64)
         rows, old = int(delay.max()) + 1, len(self._line)
         oldest_first = np.roll(self._line, old - 1 - self.struct.newest, axis=0)

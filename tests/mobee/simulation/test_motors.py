@@ -177,6 +177,14 @@ def test_motors_that_are_started_again_are_as_new_ones() -> None:
         assert old.encoders(k, 0.01).tobytes() == new.encoders(k, 0.01).tobytes()
 
 
+def test_seeds_are_taken_modulo_2_to_the_64th() -> None:
+    large, small = motors(seed=2**64 + 5), motors(seed=5)
+    assert large.seed == 5
+    large.restart(2**64 + 7, large.q)
+    small.restart(7, small.q)
+    assert (large.seed, small.seed) == (7, 7)
+
+
 def test_torque_mode_is_inertia_and_viscous_friction() -> None:
     m = motors()
     m.command(ALL, "torque", np.array([2.0, 0.0, -1.0]))
