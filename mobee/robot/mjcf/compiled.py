@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -105,6 +106,9 @@ def held_positions(model: Any, joint_equality: int) -> dict[int, float]:
     return {joint: float(model.qpos0[model.jnt_qposadr[joint]] + model.eq_data[k, 0]) for k, joint in zip(fixed, joints, strict=True)}
 
 
+_warnings = Lock()  # MuJoCo has one handler of warnings for all threads
+
+
 def compile_mjcf(path: Path) -> Compiled:
     """Compile an MJCF file with its includes, defaults and meshes.
 
@@ -115,22 +119,23 @@ def compile_mjcf(path: Path) -> Compiled:
         import mujoco
     except ModuleNotFoundError as error:
         raise NotInstalled(f'{path} is an MJCF file, which is read through the package mujoco: pip install "mobee[mjcf]"') from error
-    before = mujoco.get_mju_user_warning()
-    said: list[str] = []
-    mujoco.set_mju_user_warning(said.append)  # else MuJoCo writes MUJOCO_LOG.TXT into the working directory
-    try:
-        spec = mujoco.MjSpec.from_file(str(path))
-        if any("NaN" in text for text in said):  # what the compiler says of it does not name the cause
-            problem = "a number in this file, or in one that it includes, is nan"
-            raise RobotFileError(f"{path}: {problem}. Write a decimal number such as -0.25.")
-        model = spec.compile()
-    except ValueError as error:
-        problem = " ".join(str(error).split()).rstrip(".")
-        line = re.search(r"line (\d+)", problem)
-        place = f"{path}:{line.group(1)}" if line else f"{path}"
-        raise RobotFileError(f"{place}: MuJoCo refuses this file: {problem}. {_remedy(problem)}.") from None
-    finally:
-        mujoco.set_mju_user_warning(before)
+    with _warnings:
+        before = mujoco.get_mju_user_warning()
+        said: list[str] = []
+        mujoco.set_mju_user_warning(said.append)  # else MuJoCo writes MUJOCO_LOG.TXT into the working directory
+        try:
+            spec = mujoco.MjSpec.from_file(str(path))
+            if any("NaN" in text for text in said):  # what the compiler says of it does not name the cause
+                problem = "a number in this file, or in one that it includes, is nan"
+                raise RobotFileError(f"{path}: {problem}. Write a decimal number such as -0.25.")
+            model = spec.compile()
+        except ValueError as error:
+            problem = " ".join(str(error).split()).rstrip(".")
+            line = re.search(r"line (\d+)", problem)
+            place = f"{path}:{line.group(1)}" if line else f"{path}"
+            raise RobotFileError(f"{place}: MuJoCo refuses this file: {problem}. {_remedy(problem)}.") from None
+        finally:
+            mujoco.set_mju_user_warning(before)
     data = mujoco.MjData(model)
     kinds = _kinds(mujoco.mjtJoint, "mjJNT_", model.jnt_type)
     moving = [kind in ("hinge", "slide") for kind in kinds]

@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import importlib.util
 import warnings
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -234,6 +235,22 @@ def test_masses_are_those_of_mujoco(tmp_path: Path) -> None:
 def test_a_file_that_cannot_be_read_is_refused(tmp_path: Path, text: str, problem: str) -> None:
     with pytest.raises(RobotFileError, match=problem):
         read(mjcf_file(tmp_path, text))
+
+
+def test_files_are_read_in_threads_as_they_are_one_after_the_other(tmp_path: Path) -> None:
+    (tmp_path / "broken").mkdir()
+    good = mjcf_file(tmp_path, '<worldbody><body><joint/><geom size=".1"/></body></worldbody>')
+    broken = mjcf_file(tmp_path / "broken", '<worldbody><body><joint/><geom size=".1" pos="0 nan 0"/></body></worldbody>')
+
+    def said(path: Path) -> str:
+        try:
+            return str(len(load_robot(path).motors))
+        except RobotFileError as error:
+            return str(error)
+
+    with ThreadPoolExecutor(4) as pool:
+        found = list(pool.map(said, [good, broken] * 50))
+    assert set(found[::2]) == {"1"} and len(set(found[1::2])) == 1 and found[1].startswith(f"{broken}: a number in this file")
 
 
 def test_an_srdf_is_refused(tmp_path: Path) -> None:
