@@ -93,9 +93,9 @@ def test_a_query_is_over_the_joints_alone():
         (lambda: rrt_connect(model(), HOME, BEHIND, motors=["m7"]), "m7"),
         (lambda: rrt_connect(model(), HOME, BEHIND, step=0.0), "step"),
         (lambda: rrt_connect(model(), [HOME, HOME], BEHIND), "start has shape"),
-        (lambda: prm(model(), milestones=0), "at least 1"),
-        (lambda: prm(model(), milestones=2.5), "whole numbers"),
-        (lambda: prm(model(), neighbours=2.5), "whole numbers"),
+        (lambda: prm(model(), milestones=0), "whole number, 1 or more"),
+        (lambda: prm(model(), milestones=2.5), "whole number, 1 or more"),
+        (lambda: prm(model(), neighbours=2.5), "whole number, 1 or more"),
     ],
 )
 def test_bad_input_is_refused(call, complaint):
