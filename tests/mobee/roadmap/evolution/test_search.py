@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from mobee import NES
 from mobee.errors import InvalidValue
 from mobee.roadmap.evolution.nes import METHODS
-from mobee.roadmap.evolution.search import Restart, Search, Searches, minimize
+from mobee.roadmap.evolution.search import Restart, Search, Searches, _series, minimize
 
 LIMITS = np.array([[-1.0, 2.0], [0.1, 0.3], [-5.0, -4.0]])
 MIDDLE = LIMITS.mean(axis=1)
@@ -176,29 +176,6 @@ def test_a_restart_needs_a_box() -> None:
         Search([0.0], 1.0, restart=Restart())
 
 
-def test_simultaneous_searches_equal_separate_ones() -> None:
-    d, count, std = 7, 3, 0.3
-    rng = np.random.default_rng(2)
-    means = rng.uniform(-1.0, 1.0, (count, d))
-    alone = [NES(mean, std, seed=k) for k, mean in enumerate(means)]
-    searches = Searches(count + 1, d, alone[0].population)
-    which = np.array([0, 2, 3])
-    for number, mean in zip(which, means, strict=True):
-        searches.begin(number, mean, std)
-    scale = 10.0 ** np.linspace(0.0, 2.0, d)
-    for _ in range(15):
-        samples = np.stack([one.ask() for one in alone])
-        z = np.stack([one._z for one in alone])
-        assert np.allclose(searches.ask(which, z), samples, rtol=1e-9, atol=1e-12)
-        costs = ((samples * scale) ** 2).sum(axis=2)
-        for one, cost in zip(alone, costs, strict=True):
-            one.tell(cost)
-        searches.tell(which, z, costs)
-    assert np.allclose(searches.mean[which], [one.mean for one in alone], rtol=1e-8, atol=1e-12)
-    assert np.allclose(searches.sigma[which], [std * one.sigma for one in alone], rtol=1e-8)
-    assert (searches.age == [15, 0, 15, 15]).all()
-
-
 def test_a_search_that_begins_again_forgets_the_previous_one() -> None:
     searches = Searches(1, 4, 8)
     which = np.array([0])
@@ -211,3 +188,35 @@ def test_a_search_that_begins_again_forgets_the_previous_one() -> None:
     z = rng.standard_normal((1, 8, 4))
     assert np.allclose(searches.ask(which, z), 0.5 + 0.1 * z)
     assert searches.age[0] == 0
+
+
+def test_simultaneous_searches_equal_separate_ones() -> None:
+    """Of other scale and age: some generations leave one of them out."""
+    d, population, which = 3, 8, np.array([0, 2, 3])
+    alone = {k: NES(np.full(d, k), 0.5 + k, population, seed=int(k)) for k in which}
+    together = Searches(4, d, population)
+    for k, one in alone.items():
+        together.begin(k, one.mean, 0.5 + k)
+    scales = {0: 1.0, 2: 30.0, 3: 0.01}
+    for generation in range(30):
+        some = which if generation % 3 else which[[0, 2]]
+        samples = np.array([alone[k].ask() for k in some])
+        z = np.array([alone[k]._z for k in some])
+        np.testing.assert_allclose(together.ask(some, z), samples, rtol=1e-9, atol=1e-12)
+        costs = np.array([((scales[k] * one * [1.0, 5.0, 25.0]) ** 2).sum(axis=1) for k, one in zip(some, samples, strict=True)])
+        together.tell(some, z, costs)
+        for k, values in zip(some, costs, strict=True):
+            alone[k].tell(values)
+    for k, one in alone.items():
+        np.testing.assert_allclose(together.mean[k], one.mean, rtol=1e-8, atol=1e-12)
+        np.testing.assert_allclose(together.sigma[k], one.sigma * (0.5 + k), rtol=1e-9)
+        np.testing.assert_allclose(together.shape[k], one.shape, rtol=1e-8, atol=1e-9)
+    assert together.age.tolist() == [30, 0, 20, 30]
+
+
+def test_the_series_holds_for_small_and_large_matrices_at_once() -> None:
+    from scipy.linalg import expm
+
+    half = np.random.default_rng(3).normal(size=(2, 4, 4)) * np.array([0.001, 1.0])[:, None, None]
+    a = half + half.transpose(0, 2, 1)
+    np.testing.assert_allclose(a @ _series(a), expm(a) - np.eye(4), rtol=1e-9, atol=1e-12)
