@@ -20,6 +20,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from mobee.arrays import checked_count
 from mobee.errors import InvalidValue
 from mobee.model.model import Model
 from mobee.model.pose import Pose
@@ -138,8 +139,7 @@ class RobotVectorEnv(VectorEnv[Any, Any, Any]):
 
     def __init__(self, num_envs: int, max_episode_steps: int, observations: Space[Any], actions: Space[Any]) -> None:
         for name, number in (("num_envs", num_envs), ("max_episode_steps", max_episode_steps)):
-            if whole(name, number) < 1:
-                raise InvalidValue(f"{name} {number!r}: give 1 or more.")
+            checked_count(name, number, 1)
         self.num_envs, self.render_mode, self._most = num_envs, None, max_episode_steps
         self.single_observation_space, self.single_action_space = observations, actions
         self.observation_space, self.action_space = batch_space(observations, num_envs), batch_space(actions, num_envs)

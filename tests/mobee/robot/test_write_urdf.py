@@ -17,7 +17,7 @@ from mobee.robot.load import load_robot
 from mobee.robot.robot import Robot
 from mobee.robot.urdf.write import write_urdf
 from mobee.robot.xml.write import write_xml
-from tests.mobee.robot.robot_files import robot_file
+from tests.mobee.robot.robot_files import arm_on_a_pillar, robot_file
 from tests.mobee.robot.same_robot import assert_same_robot
 from tests.mobee.robot.test_write_xml import random_robot
 from tests.mobee.robot.urdf_files import foreign
@@ -86,14 +86,7 @@ def test_a_cylinder_between_two_capsules_remains_one(tmp_path: Path) -> None:
 
 
 def test_shapes_outside_of_every_part_remain_there(tmp_path: Path) -> None:
-    path = robot_file(
-        tmp_path,
-        '<link z="0.2" radius="0.05" field="0.08"><bodypart name="arm">',
-        '<motor name="pan" minPos="-90" maxPos="90"><joint z="1"><link x="-0.2">',
-        '<motor name="bend" minPos="0" maxPos="90"><joint y="1"><link x="-0.2" radius="0.02" field="0.06"/></joint></motor>',
-        "</link></joint></motor></bodypart></link>",
-    )
-    robot = load_robot(path)
+    robot = load_robot(arm_on_a_pillar(tmp_path))
     assert robot.shapes[0].part == ""
     assert len(robot.field_pairs) == 1
     assert_same_robot(robot, read_back(robot, tmp_path))

@@ -14,7 +14,7 @@ from mobee.errors import InvalidValue, RobotFileError
 from mobee.robot.load import load_robot
 from mobee.robot.robot import Body, Joint, Marker, Motor, Part, Robot, Shape
 from mobee.robot.xml.write import write_xml
-from tests.mobee.robot.robot_files import robot_file
+from tests.mobee.robot.robot_files import arm_on_a_pillar, robot_file
 from tests.mobee.robot.same_robot import assert_same_robot
 from tests.mobee.robot.urdf_files import foreign
 
@@ -205,14 +205,7 @@ def test_constraints_are_read_back_with_motors_in_metres_and_names_that_are_no_w
 
 
 def test_shapes_outside_of_every_part_remain_there(tmp_path: Path) -> None:
-    path = robot_file(
-        tmp_path,
-        '<link z="0.2" radius="0.05" field="0.08"><bodypart name="arm">',
-        '<motor name="pan" minPos="-90" maxPos="90"><joint z="1"><link x="-0.2">',
-        '<motor name="bend" minPos="0" maxPos="90"><joint y="1"><link x="-0.2" radius="0.02" field="0.06"/></joint></motor>',
-        "</link></joint></motor></bodypart></link>",
-    )
-    robot = load_robot(path)
+    robot = load_robot(arm_on_a_pillar(tmp_path))
     assert robot.shapes[0].part == ""
     assert len(robot.field_pairs) == 1
     assert_same_robot(robot, read_back(robot, tmp_path))
